@@ -1,0 +1,1 @@
+"""Camera frames to image motion, with sigma and a verdict."""

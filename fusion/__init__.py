@@ -1,0 +1,1 @@
+"""The filter, its gates and supervisor, and the readings that go in."""

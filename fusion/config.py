@@ -1,0 +1,195 @@
+"""Configuration: typed, strict, with the unit in every name.
+
+A configuration is one TOML file.  Noise and gate settings have defaults that serve every vehicle; ``[sensor.NAME]``,
+``[surface.NAME]``, ``[corridor]`` and ``[initial]`` describe this vehicle and this flight and usually come from the
+flight folder (:meth:`Config.with_defaults_from`).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from axialnav.fusion.errors import ConfigError
+from axialnav.fusion.strict_toml import decode, dump, parse, set_by_path
+from axialnav.models.rig import AnySensor, NonNegative, Positive, Surface, Vector3
+
+Probability = Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of all configuration tables: frozen and strict."""
+
+
+class Section(_Table, frozen=True, kw_only=True):
+    """One stretch of a corridor between two points [m]."""
+
+    kind: Literal["straight", "stairs", "corner"]
+    start: Vector3
+    end: Vector3
+    width: Positive | None = None
+    height: Positive | None = None
+
+
+class Corridor(_Table, frozen=True, kw_only=True):
+    """Where the corridor runs; ``axis`` is the unit vector along which "axial" is meant."""
+
+    axis: Vector3 = (1.0, 0.0, 0.0)
+    section: tuple[Section, ...] = ()
+
+
+class Initial(_Table, frozen=True, kw_only=True):
+    """First state.  Absent: level from gravity, at the origin, standing still, yaw unknown."""
+
+    position_m: Vector3
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    yaw_rad: float = 0.0
+    sigma_position_m: Positive = 0.1
+    sigma_velocity_m_s: Positive = 0.1
+    sigma_yaw_rad: Positive = 0.05
+
+
+class Gate(_Table, frozen=True, kw_only=True):
+    """Acceptance of a reading by its normalised innovation squared.
+
+    ``probability`` is the share of honest readings that pass; between ``soft_sigma`` and the gate the weight of a
+    reading redescends.
+    """
+
+    probability: Probability = 0.999
+    soft_sigma: Positive = 2.0
+
+
+class ImuTuning(_Table, frozen=True, kw_only=True):
+    """How far the inertial unit is trusted beyond its data sheet.
+
+    Vibration and sampling make the noise in flight larger than at rest: ``accel_noise_scale`` and
+    ``gyro_noise_scale`` multiply the sensor's densities.
+    """
+
+    accel_noise_scale: Positive = 1.0
+    gyro_noise_scale: Positive = 1.0
+    initial_gyro_bias_rad_s: Positive = 0.01
+    initial_accel_bias_m_s2: Positive = 0.3
+
+
+class UwbTuning(_Table, frozen=True, kw_only=True):
+    """Noise of UWB readings; ``sigma_m`` is honest for errors that are correlated in time."""
+
+    sigma_m: Positive = 0.5
+    bias_sigma_m: Positive = 0.1
+    bias_time_s: Positive = 10.0
+    gate: Gate = Gate()
+
+
+class FlowTuning(_Table, frozen=True, kw_only=True):
+    """Noise of image motion."""
+
+    sigma_px: Positive = 2.0
+    scale_sigma: Positive = 0.03
+    scale_walk: NonNegative = 1e-4
+    min_quality: NonNegative = 1.0
+    gate: Gate = Gate()
+
+
+class RangeTuning(_Table, frozen=True, kw_only=True):
+    """Noise of wall and floor ranges."""
+
+    sigma_m: Positive = 0.03
+    offset_sigma_m: Positive = 1.0
+    offset_walk_m: NonNegative = 1e-3
+    gate: Gate = Gate()
+
+
+class HeightTuning(_Table, frozen=True, kw_only=True):
+    """Noise of barometric height."""
+
+    sigma_m: Positive = 0.5
+    gate: Gate = Gate()
+
+
+class AttitudeTuning(_Table, frozen=True, kw_only=True):
+    """Noise of the autopilot's attitude."""
+
+    sigma_rad: Positive = 0.05
+    gate: Gate = Gate()
+
+
+class SupervisorTuning(_Table, frozen=True, kw_only=True):
+    """When a source is held suspect, re-anchored or reported silent."""
+
+    timeout_s: Positive = 1.0
+
+
+class Config(_Table, frozen=True, kw_only=True):
+    """Everything the estimator has to be told.  ``Config()`` is the default for every vehicle."""
+
+    gravity_m_s2: Annotated[float, msgspec.Meta(gt=0.0, le=30.0)] = 9.80665
+    corridor: Corridor | None = None
+    initial: Initial | None = None
+    imu: ImuTuning = ImuTuning()
+    uwb: UwbTuning = UwbTuning()
+    flow: FlowTuning = FlowTuning()
+    range: RangeTuning = RangeTuning()
+    height: HeightTuning = HeightTuning()
+    attitude: AttitudeTuning = AttitudeTuning()
+    supervisor: SupervisorTuning = SupervisorTuning()
+    disabled: tuple[str, ...] = ()
+    surface: dict[str, Surface] = {}
+    sensor: dict[str, AnySensor] = {}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], *, where: str = "configuration") -> Config:
+        """Build from plain data (nested dicts); raises :class:`ConfigError` naming the nearest key."""
+        return decode(data, cls, where=where)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Config:
+        """Read a TOML file; raises :class:`ConfigError` with one line for a person."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"configuration {path}: cannot be read: {error}") from None
+        return cls.from_dict(parse(text, where=str(path)), where=str(path))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain nested data; ``Config.from_dict`` of it is equal to ``self``."""
+        plain: dict[str, Any] = msgspec.to_builtins(self)
+        return plain
+
+    def to_toml(self) -> str:
+        """TOML text that reads back to an equal configuration."""
+        return dump(self.to_dict())
+
+    def with_params(self, params: dict[str, str]) -> Config:
+        """Copy with single values replaced, e.g. ``{"uwb.sigma_m": "0.4"}``; values are TOML text."""
+        data = self.to_dict()
+        for path, text in params.items():
+            set_by_path(data, path, text)
+        return self.from_dict(data, where="--param")
+
+    def without(self, names: tuple[str, ...]) -> Config:
+        """Copy in which the named sensors are switched off.
+
+        Raises
+        ------
+        ConfigError
+            A name that no sensor has.
+        """
+        unknown = [name for name in names if name not in self.sensor]
+        if unknown:
+            raise ConfigError(f"no sensor named {', '.join(unknown)}; there are {', '.join(self.sensor) or 'none'}")
+        return msgspec.structs.replace(self, disabled=tuple(sorted({*self.disabled, *names})))
+
+    def with_defaults_from(self, flight: Config) -> Config:
+        """Copy with sensors, surfaces, corridor and first state taken from ``flight`` where this has none."""
+        return msgspec.structs.replace(
+            self,
+            gravity_m_s2=self.gravity_m_s2 if self.gravity_m_s2 != Config().gravity_m_s2 else flight.gravity_m_s2,
+            corridor=self.corridor or flight.corridor,
+            initial=self.initial or flight.initial,
+            surface={**flight.surface, **self.surface},
+            sensor={**flight.sensor, **self.sensor},
+        )

@@ -1,0 +1,184 @@
+"""What the filter says: a verdict with a reason for every reading, and the state with its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Verdict(IntEnum):
+    """What happened to a reading."""
+
+    FUSED = 0
+    GATED = 1
+    LATE = 2
+    BLIND = 3
+    SUSPECT = 4
+    INVALID = 5
+
+
+class Reason(IntEnum):
+    """Why it happened; members are sentences in :data:`REASONS`."""
+
+    NONE = 0
+    INNOVATION = 1
+    OUT_OF_RANGE = 2
+    TOO_OLD = 3
+    WEAK_SIGNAL = 4
+    NO_GEOMETRY = 5
+    SIGN_UNCERTAIN = 6
+    TOO_SHORT = 7
+    SUPERVISOR = 8
+    NOT_ALIGNED = 9
+    UNKNOWN_ANCHOR = 10
+    ALIGNING = 11
+    DISABLED = 12
+
+
+REASONS: dict[Reason, str] = {
+    Reason.NONE: "fused with the filter",
+    Reason.INNOVATION: "the innovation is outside the gate",
+    Reason.OUT_OF_RANGE: "the value is outside the sensor's range",
+    Reason.TOO_OLD: "the stamp is older than the filter can reach back",
+    Reason.WEAK_SIGNAL: "the sensor reports a quality below the limit",
+    Reason.NO_GEOMETRY: "the beam or optical axis does not meet the surface from here",
+    Reason.SIGN_UNCERTAIN: "an unsigned length while the direction of motion is not known",
+    Reason.TOO_SHORT: "the blur is too short to inform",
+    Reason.SUPERVISOR: "the supervisor holds the source suspect",
+    Reason.NOT_ALIGNED: "the filter has no attitude yet",
+    Reason.UNKNOWN_ANCHOR: "the anchor is not in the sensor's list",
+    Reason.ALIGNING: "used for the first position, not as an update",
+    Reason.DISABLED: "the source is switched off",
+}
+
+
+class Health(IntFlag):
+    """Condition of the estimate, one bit each; the ``flags`` column of ``fused.csv``."""
+
+    GOOD = 0
+    ALIGNING = 1
+    DEAD_RECKONING = 2
+    VELOCITY_INVALID = 4
+    ACCELEROMETER_FAULT = 8
+    UWB_SUSPECT = 16
+    POSITION_RESET = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Record of one reading.
+
+    Attributes
+    ----------
+    t_ns
+        Stamp of the reading.
+    sensor
+        Name of the source.
+    verdict, reason
+        What happened and why.
+    innovation, variance
+        Reading minus prediction and its predicted variance S, per axis, in the sensor's own unit.
+    nis
+        Normalised innovation squared of all axes together.
+    gate
+        Threshold on ``nis`` at the configured probability.
+    weight
+        1 for a full update, towards 0 where the redescending weight has taken effect.
+    """
+
+    t_ns: int
+    sensor: str
+    verdict: Verdict
+    reason: Reason
+    innovation: tuple[float, ...] = ()
+    variance: tuple[float, ...] = ()
+    nis: float = float("nan")
+    gate: float = float("nan")
+    weight: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class AxialState:
+    """The estimate at one instant, corridor frame W (x axial, z up), SI units.
+
+    ``velocity_covariance`` is 3x3; ``resets`` counts position re-anchorings and ``last_reset_delta_m`` is the jump of
+    the latest one.
+    """
+
+    t_ns: int
+    axial_position_m: float
+    axial_velocity_m_s: float
+    sigma_axial_position_m: float
+    sigma_axial_velocity_m_s: float
+    position_m: Array
+    velocity_m_s: Array
+    quaternion_WB: Array
+    gyro_bias_rad_s: Array
+    accel_bias_m_s2: Array
+    blur_scale: float
+    uwb_bias_m: float
+    wall_offset_m: float
+    covariance: Array
+    flags: Health
+    resets: int
+    last_reset_delta_m: Array
+
+    @property
+    def velocity_valid(self) -> bool:
+        """Whether the velocity may be used for control."""
+        return not self.flags & (Health.VELOCITY_INVALID | Health.ALIGNING)
+
+    @property
+    def dead_reckoning(self) -> bool:
+        """Whether no axial aid has been fused for longer than the limit."""
+        return bool(self.flags & Health.DEAD_RECKONING)
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """The estimate at every IMU sample; arrays over n samples, corridor frame, SI units.
+
+    ``position_covariance`` and ``velocity_covariance`` are (n, 3, 3), ``quaternion_WB`` (n, 4) scalar first,
+    ``sigma_attitude_rad`` (n, 3) in body axes, ``flags`` (n,) of :class:`Health`, ``resets`` (n,) running count.
+    """
+
+    t_ns: NDArray[np.int64]
+    position_m: Array
+    velocity_m_s: Array
+    quaternion_WB: Array
+    gyro_bias_rad_s: Array
+    accel_bias_m_s2: Array
+    blur_scale: Array
+    uwb_bias_m: Array
+    wall_offset_m: Array
+    position_covariance: Array
+    velocity_covariance: Array
+    sigma_attitude_rad: Array
+    flags: NDArray[np.int64]
+    resets: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class InnovationLog:
+    """One row per reading that is not an IMU sample, in the order of processing.
+
+    ``source`` indexes ``sensors``; ``dof`` is the number of axes used; ``innovation`` and ``variance`` are (n, 3) with
+    NaN beyond ``dof``; ``verdict`` and ``reason`` hold the enums' values.
+    """
+
+    sensors: tuple[str, ...]
+    t_ns: NDArray[np.int64]
+    source: NDArray[np.int64]
+    verdict: NDArray[np.int64]
+    reason: NDArray[np.int64]
+    dof: NDArray[np.int64]
+    innovation: Array
+    variance: Array
+    nis: Array
+    gate: Array
+    weight: Array

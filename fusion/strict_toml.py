@@ -1,0 +1,134 @@
+"""Strict TOML: text to typed structures and back, with errors that name the nearest key.
+
+msgspec does the type checks; this module turns its findings into one line that a person can act on, and writes TOML
+that reads back to an equal structure.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
+
+import msgspec
+
+from axialnav.fusion.errors import ConfigError
+
+T = TypeVar("T")
+_UNKNOWN = re.compile(r"unknown field `(?P<field>[^`]+)`(?: - at `(?P<path>[^`]+)`)?")
+_BARE_KEY = re.compile(r"^[A-Za-z0-9_-]+$")
+
+
+def decode(data: Mapping[str, Any], kind: type[T], *, where: str) -> T:
+    """Convert plain data to ``kind``.
+
+    Raises
+    ------
+    ConfigError
+        Unknown key (with the nearest known one), wrong type or value out of limits; ``where`` names the source.
+    """
+    try:
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{where}: {_explain(str(error), kind)}") from None
+
+
+def parse(text: str, *, where: str) -> dict[str, Any]:
+    """Parse TOML text; a syntax error becomes one :class:`ConfigError` line."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{where}: not valid TOML: {error}") from None
+
+
+def _explain(message: str, kind: type[Any]) -> str:
+    found = _UNKNOWN.search(message)
+    if not found:
+        return message.replace("$.", "").replace(" - at ", ", at ")
+    field = found["field"]
+    table = (found["path"] or "$").removeprefix("$").removeprefix(".")
+    near = difflib.get_close_matches(field, list(_all_fields(kind)), n=1, cutoff=0.5)
+    hint = f"; did you mean `{near[0]}`?" if near else ""
+    return f"unknown key `{table + '.' if table else ''}{field}`{hint}"
+
+
+def _all_fields(kind: type[Any]) -> Iterator[str]:
+    """Yield every key that can occur anywhere below ``kind``."""
+    seen: set[type[Any]] = set()
+    stack: list[Any] = [kind]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, type) and issubclass(node, msgspec.Struct):
+            if node in seen:
+                continue
+            seen.add(node)
+            for field in msgspec.structs.fields(node):
+                yield field.encode_name
+                stack.append(field.type)
+        else:
+            stack.extend(getattr(node, "__args__", ()))
+
+
+def set_by_path(data: dict[str, Any], path: str, text: str) -> None:
+    """Set ``data`` at a dotted ``path`` to the TOML value ``text`` (a bare word is taken as a string), in place.
+
+    Raises
+    ------
+    ConfigError
+        Empty path, or a path that runs through something that is not a table.
+    """
+    *tables, key = path.split(".")
+    if not key or not all(tables):
+        raise ConfigError(f"parameter name must be dotted like uwb.sigma_m, got {path!r}")
+    for name in tables:
+        data = data.setdefault(name, {})
+        if not isinstance(data, dict):
+            raise ConfigError(f"parameter {path!r} runs through {name!r}, which is a value and not a table")
+    try:
+        data[key] = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        data[key] = text
+
+
+def dump(data: Mapping[str, Any]) -> str:
+    """Write plain data as TOML; floats keep every bit, None is left out."""
+    return "\n".join(_lines(data, ())).strip() + "\n"
+
+
+def _lines(data: Mapping[str, Any], prefix: tuple[str, ...]) -> Iterator[str]:
+    tables: list[tuple[str, Mapping[str, Any]]] = []
+    arrays: list[tuple[str, list[Mapping[str, Any]]]] = []
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            tables.append((key, value))
+        elif isinstance(value, list | tuple) and value and all(isinstance(v, Mapping) for v in value):
+            arrays.append((key, list(value)))
+        elif value is not None:
+            yield f"{_key(key)} = {_value(value)}"
+    for key, table in tables:
+        if any(not isinstance(v, Mapping) for v in table.values()) or not table:
+            yield f"\n[{'.'.join(map(_key, (*prefix, key)))}]"
+        yield from _lines(table, (*prefix, key))
+    for key, rows in arrays:
+        for row in rows:
+            yield f"\n[[{'.'.join(map(_key, (*prefix, key)))}]]"
+            yield from _lines(row, (*prefix, key))
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.match(key) else _value(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return msgspec.json.encode(value).decode()
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else ("nan" if value != value else f"{'-' * (value < 0)}inf")
+    if isinstance(value, int):
+        return str(value)
+    return f"[{', '.join(_value(v) for v in value)}]"

@@ -1,0 +1,1 @@
+"""What a sensor reads, given the state: physics only."""

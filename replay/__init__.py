@@ -1,0 +1,1 @@
+"""Flights from disk, replay, metrics, report and the command line."""
