@@ -1,0 +1,66 @@
+# Everything runs from the project's own .venv; the first command installs it, later ones do not.
+# Another interpreter: make PYTHON=python3.12 test
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/installed.stamp
+DOCS_INSTALLED := $(VENV)/installed-docs.stamp
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: help demo test quick lint docs bench bench-flights bench-motion bench-fusion readme-check clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo          replay a flight and write runs/demo/report.html"
+	@echo "make test          the whole test suite"
+	@echo "make quick         the test suite without the long statistical runs"
+	@echo "make lint          style, types and layering"
+	@echo "make docs          the documentation, into docs/_build/html"
+	@echo "make bench         accuracy on the real flights; also bench-motion, bench-fusion"
+	@echo "make readme-check  run every command of the README in a fresh clone"
+	@echo "make clean         remove what the commands above have made, .venv included"
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and "axialnav needs Python 3.11 or newer, but $(PYTHON) is %d.%d; say which one to use: make PYTHON=python3.12" % v[:2])'
+	@$(PYTHON) -m venv $(VENV)
+
+$(INSTALLED): pyproject.toml | $(BIN)/python
+	@echo "installing axialnav into $(VENV), once; this takes a minute or two"
+	@$(PIP) --editable ".[replay,dev]"
+	@touch $@
+
+$(DOCS_INSTALLED): $(INSTALLED)
+	@echo "installing the documentation tools into $(VENV), once"
+	@$(PIP) --editable ".[replay,dev,docs]"
+	@touch $@
+
+demo: $(INSTALLED)
+	@$(BIN)/axialnav demo
+
+test: $(INSTALLED)
+	@$(BIN)/python -m pytest -rs
+
+quick: $(INSTALLED)
+	@$(BIN)/python -m pytest -rs -m "not slow"
+
+lint: $(INSTALLED)
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+docs: $(DOCS_INSTALLED)
+	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+bench: bench-flights
+bench-flights bench-motion bench-fusion: bench-%: $(INSTALLED)
+	@$(BIN)/python -m tests.bench.bench_$*
+
+readme-check: $(INSTALLED)
+	@$(BIN)/python -m tests.readme_check
+
+clean:
+	@rm -rf $(VENV) runs build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,25 @@
+"""``axialnav`` and ``python -m axialnav``: the command line, where its libraries are installed."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> int:
+    """Run the command line and return its exit code; one line on stderr where the ``replay`` extra is missing."""
+    try:
+        from axialnav.replay import cli
+    except ModuleNotFoundError as missing:
+        if missing.name is None or missing.name.partition(".")[0] == "axialnav":
+            raise
+        print(
+            f"axialnav: the command line needs the package {missing.name!r}, which is not installed; "
+            "install the 'replay' extra: pip install 'axialnav[replay]'",
+            file=sys.stderr,
+        )
+        return 2
+    return cli.main() or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
