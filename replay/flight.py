@@ -1,0 +1,158 @@
+"""A flight in memory: what is mounted, what it read, what is known to be true, and what was left out.
+
+Tables hold numpy arrays for replay at full speed; :meth:`Flight.readings` gives the same rows as the typed readings
+that a vehicle would push in flight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.readings import Reading
+
+Array = NDArray[np.float64]
+Stamps = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Drop:
+    """Something in a recording that was left out, or kept with a reservation.
+
+    Attributes
+    ----------
+    sensor
+        Folder of the sensor, or the file concerned.
+    reason
+        Why; one phrase for a person.
+    count
+        How many rows (for files, folders and keys: how many of those).
+    example
+        The first case, with its line number where there is one.
+    """
+
+    sensor: str
+    reason: str
+    count: int
+    example: str
+
+
+@dataclass(frozen=True)
+class SensorTable:
+    """All readings of one sensor.
+
+    Attributes
+    ----------
+    t_ns
+        Stamps [ns], shape (n,), ascending; equal stamps keep the order of the file.
+    columns
+        Keyed as the fields of the reading class, first axis n; NaN stands for None.
+    anchors
+        UWB only: the anchor names that the index columns refer to, in the order of the sensor's description.
+    unlisted
+        UWB only: row -> the anchor names of that row, for rows that name an anchor outside ``anchors`` (index -1).
+    """
+
+    t_ns: Stamps
+    columns: Mapping[str, NDArray[Any]]
+    anchors: tuple[str, ...] = ()
+    unlisted: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Ground truth in the flight's world frame.
+
+    Attributes
+    ----------
+    t_ns
+        Stamps [ns], shape (n,), ascending.
+    position_m, velocity_m_s
+        World frame, shape (n, 3); velocities are NaN where the file has none.
+    quaternion_WB
+        Body to world, Hamilton, scalar first, unit within 0.01 as recorded, shape (n, 4).
+    gyro_bias, accel_bias
+        [rad/s] and [m/s^2], shape (n, 3), or None where absent.
+    """
+
+    t_ns: Stamps
+    position_m: Array
+    quaternion_WB: Array  # noqa: N815  the symbols of the frames keep their case
+    velocity_m_s: Array
+    gyro_bias: Array | None = None
+    accel_bias: Array | None = None
+
+
+@dataclass(frozen=True)
+class GpsReference:
+    """GPS to score against; never fused.  East, north, up: position [m] and velocity [m/s], shape (n, 3)."""
+
+    t_ns: Stamps
+    position_m: Array
+    velocity_m_s: Array
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One recording, ready for replay.
+
+    Attributes
+    ----------
+    name, path
+        Name of the flight and the folder that holds it.
+    info
+        ``source``, ``licence`` and ``note`` where given.
+    config
+        What the flight itself says of rig and world: gravity, corridor, surfaces, first state, sensors.
+    tables
+        Sensor name -> its readings.  A configured sensor without a usable row has an empty table.
+    truth, gps
+        References, or None.
+    evaluation
+        (start_s, end_s) of the scoring window after the first IMU sample; None = from the beginning / to the end.
+    drops
+        Everything that was left out or kept with a reservation, counted and named.
+    """
+
+    name: str
+    path: Path
+    info: Mapping[str, str]
+    config: Config
+    tables: Mapping[str, SensorTable]
+    truth: Truth | None = None
+    gps: GpsReference | None = None
+    evaluation: tuple[float | None, float | None] = (None, None)
+    drops: tuple[Drop, ...] = ()
+
+    def readings(self) -> Iterator[Reading]:
+        """Typed readings of all fusable sensors in time order; ties in the fixed order of the sensors."""
+        from axialnav.replay.flight_readings import merge_readings
+
+        return merge_readings(self)
+
+    def image_path(self, sensor: str, filename: str) -> Path:
+        """Where the image ``filename`` of a camera lies."""
+        return self.path / "mav0" / sensor / "data" / filename
+
+
+def load_flight(path: str | Path) -> Flight:
+    """Read a flight folder (EuRoC/ASL layout); ``path`` is the flight or its ``mav0``.
+
+    Raises
+    ------
+    FlightError
+        One line: what cannot be used, why, and the way out.  What can be left out is left out and listed in
+        :attr:`Flight.drops` instead.
+    """
+    from axialnav.replay.readers.flight_folder import read_flight_folder
+
+    return read_flight_folder(Path(path))

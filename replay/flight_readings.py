@@ -1,0 +1,86 @@
+"""Tables back to typed readings, in the order in which a vehicle would have pushed them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from axialnav.fusion.readings import (
+    Attitude,
+    BlurLength,
+    Height,
+    ImuSample,
+    PixelMotion,
+    Reading,
+    UwbFix,
+    UwbRange,
+    UwbTdoa,
+    WallRange,
+)
+from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, BlurMeter, Flow, Imu, RangeFinder, Uwb
+from axialnav.replay.flight import Flight, SensorTable
+
+_ANCHOR_FIELDS = ("anchor", "anchor_a", "anchor_b")
+
+
+def merge_readings(flight: Flight) -> Iterator[Reading]:
+    """All fusable readings of a flight in time order; ties in the order of ``flight.tables``."""
+    makers: list[Callable[[int], Reading]] = []
+    stamps: list[np.ndarray[Any, np.dtype[np.int64]]] = []
+    for name, table in flight.tables.items():
+        kind = reading_class(flight.config.sensor[name])
+        if kind is not None:
+            makers.append(_maker(kind, name, table))
+            stamps.append(table.t_ns)
+    if not stamps:
+        return
+    source = np.repeat(np.arange(len(stamps)), [len(t) for t in stamps])
+    row = np.concatenate([np.arange(len(t)) for t in stamps])
+    order = np.lexsort((row, source, np.concatenate(stamps)))
+    for which, index in zip(source[order].tolist(), row[order].tolist(), strict=True):
+        yield makers[which](index)
+
+
+def reading_class(spec: AnySensor) -> type[Reading] | None:
+    """Reading class of a sensor; None for what is not fused as it is (camera frames, GPS)."""
+    if isinstance(spec, Uwb):
+        by_measurement: dict[str, type[Reading]] = {"range": UwbRange, "tdoa": UwbTdoa, "position": UwbFix}
+        return by_measurement[spec.measurement]
+    if isinstance(spec, BlurMeter):
+        return PixelMotion if spec.signed else BlurLength
+    kinds: dict[type, type[Reading]] = {
+        Imu: ImuSample,
+        Flow: PixelMotion,
+        RangeFinder: WallRange,
+        Barometer: Height,
+        AttitudeSource: Attitude,
+    }
+    return kinds.get(type(spec))
+
+
+def _maker(kind: type[Reading], sensor: str, table: SensorTable) -> Callable[[int], Reading]:
+    """Function that builds the reading of a row."""
+    t_ns = table.t_ns.tolist()
+    columns = {name: [_plain(value) for value in array.tolist()] for name, array in table.columns.items()}
+    anchor_fields = [name for name in _ANCHOR_FIELDS if name in columns]
+    for position, name in enumerate(anchor_fields):
+        columns[name] = [
+            table.anchors[index] if index >= 0 else table.unlisted[row][position]
+            for row, index in enumerate(columns[name])
+        ]
+
+    def make(row: int) -> Reading:
+        fields: dict[str, Any] = {name: values[row] for name, values in columns.items()}
+        return kind(t_ns=t_ns[row], sensor=sensor, **fields)
+
+    return make
+
+
+def _plain(value: Any) -> Any:
+    """NaN to None, vectors to tuples (None for a vector of NaN)."""
+    if isinstance(value, list):
+        return None if any(math.isnan(part) for part in value) else tuple(value)
+    return None if isinstance(value, float) and math.isnan(value) else value

@@ -1,0 +1,216 @@
+"""Rows of a ``data.csv``: exact integer stamps and float64 values, dirty rows left out and counted.
+
+A clean file goes through numpy's compiled parser.  Whatever that refuses is read line by line, so that one bad row
+costs one row.  Every value is bit for bit what ``float(text)`` gives, on both ways.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.errors import FlightError
+from axialnav.replay.readers.columns import Column, Layout
+from axialnav.replay.readers.dropped import DropLog
+from axialnav.replay.readers.header import STAMP_NAMES, place_columns, split_header
+
+STAMP_LIMIT = 2**62
+_LINE_END = re.compile(r"\r\n|\r|\n")
+_WHOLE = re.compile(r"[+-]?\d{1,19}(\.0*)?")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one file, in file order.
+
+    Attributes
+    ----------
+    where
+        File name for messages.
+    t_ns
+        Stamps [ns], shape (n,).
+    values
+        One array of shape (n,) per column found, float64 or (for text columns) str.
+    text
+        The whole file, for examples.
+    numbers
+        Line number (from 1) of every row, or None to find them when they are needed.
+    """
+
+    where: str
+    t_ns: NDArray[np.int64]
+    values: dict[Column, NDArray[Any]]
+    text: str = field(repr=False, default="")
+    numbers: NDArray[np.int64] | None = None
+
+    @cached_property
+    def _lines(self) -> list[tuple[int, str]]:
+        return list(_data_lines(self.text))
+
+    def example(self, row: int) -> str:
+        """Line number and text of a row."""
+        if self.numbers is None:
+            number, text = self._lines[row]
+            return f"line {number}: {text}"
+        number = int(self.numbers[row])
+        return f"line {number}: {_LINE_END.split(self.text)[number - 1]}"
+
+    def subset(self, rows: NDArray[Any]) -> Rows:
+        """The rows chosen by a mask or an index array."""
+        numbers = self.numbers if self.numbers is not None else np.array([n for n, _ in self._lines], dtype=np.int64)
+        values = {column: array[rows] for column, array in self.values.items()}
+        return Rows(self.where, self.t_ns[rows], values, self.text, numbers[rows])
+
+
+def read_rows(path: Path, layout: Layout, sensor: str, drops: DropLog) -> Rows:
+    """Read a ``data.csv``.
+
+    Rows that are short, long or not numbers are left out and noted in ``drops``; empty values become NaN.
+
+    Raises
+    ------
+    FlightError
+        The file cannot be opened, or its header does not fit ``layout``.
+    """
+    where = f"{sensor}/{path.name}"
+    try:
+        text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    except OSError as error:
+        raise FlightError(f"{path}: cannot be read: {error.strerror or error}") from None
+    header, first = _head(text)
+    if first is None:
+        return _no_rows(where, text)
+    width = len(header) if header else len(_fields(first))
+    placed = place_columns(header, width, layout, where)
+    for index, column in enumerate(placed):
+        if column is None:
+            name = header[index + 1][0] if header and index + 1 < len(header) else f"column {index + 2}"
+            drops.add(sensor, "column not known, not used", 1, name or f"column {index + 2}")
+    fast = _parse_fast(path, placed)
+    if fast is not None:
+        return Rows(where, fast[0], fast[1], text)
+    return _parse_slow(text, placed, where, sensor, drops)
+
+
+def _no_rows(where: str, text: str) -> Rows:
+    return Rows(where, np.zeros(0, dtype=np.int64), {}, text, np.zeros(0, dtype=np.int64))
+
+
+def _head(text: str) -> tuple[list[tuple[str, str]] | None, str | None]:
+    """Header (names and units), if there is one, and the first line of data, if there is one."""
+    header = None
+    for match in re.finditer(r"[^\r\n]+", text):
+        line = match.group().strip()
+        if not line:
+            continue
+        names = split_header(line)
+        if line.startswith("#"):
+            header = names if len(names) > 1 and names[0][0] in STAMP_NAMES else header
+        elif _is_header(line):
+            header = names
+        else:
+            return header, line
+    return header, None
+
+
+def _is_header(line: str) -> bool:
+    """Whether a line without ``#`` is a header: it names the stamp."""
+    return split_header(line)[:1] != [] and split_header(line)[0][0] in STAMP_NAMES
+
+
+def _fields(line: str) -> list[str]:
+    fields = [part.strip() for part in line.partition("#")[0].split(",")]
+    if len(fields) > 1 and not fields[-1]:
+        fields.pop()
+    return fields
+
+
+def _data_lines(text: str) -> Iterator[tuple[int, str]]:
+    """Line number and text of every line of data."""
+    for number, line in enumerate(_LINE_END.split(text), start=1):
+        content = line.partition("#")[0].strip()
+        if content and not _is_header(content):
+            yield number, line.strip()
+
+
+def _parse_fast(path: Path, placed: list[Column | None]) -> tuple[NDArray[np.int64], dict[Column, NDArray[Any]]] | None:
+    """Parse with :func:`numpy.loadtxt`; None where the file is not clean or holds free text."""
+    if any(column is not None and column.text and not column.name.startswith("anchor") for column in placed):
+        return None
+    kinds = ["S1" if column is None else "i8" if column.text else "f8" for column in placed]
+    names = [f"c{i}" for i in range(len(placed))]
+    dtype = np.dtype([("t", "i8"), *zip(names, kinds, strict=True)])
+    try:
+        table = np.loadtxt(path, dtype=dtype, delimiter=",", encoding="utf-8-sig", ndmin=1)
+    except (ValueError, OSError, UnicodeError):
+        return None
+    stamps = np.ascontiguousarray(table["t"])
+    if len(stamps) and max(abs(int(stamps.min())), abs(int(stamps.max()))) >= STAMP_LIMIT:
+        return None
+    values: dict[Column, NDArray[Any]] = {}
+    for name, column in zip(names, placed, strict=True):
+        if column is not None:
+            array = np.ascontiguousarray(table[name])
+            values[column] = _as_text(array) if column.text else array
+    return stamps, values
+
+
+def _as_text(whole: NDArray[Any]) -> NDArray[Any]:
+    """Integers to text, by way of the few distinct ones."""
+    distinct, inverse = np.unique(whole, return_inverse=True)
+    return np.array([str(value) for value in distinct.tolist()])[inverse]
+
+
+def _parse_slow(text: str, placed: list[Column | None], where: str, sensor: str, drops: DropLog) -> Rows:
+    bad: dict[str, list[str]] = {}
+    numbers: list[int] = []
+    stamps: list[int] = []
+    rows: list[list[Any]] = []
+    width = len(placed) + 1
+    needed = 1 + max((i for i, column in enumerate(placed, start=1) if column is not None and column.required))
+    for number, line in _data_lines(text):
+        fields = _fields(line)
+        row = _parse_row(fields, placed, width, needed)
+        if isinstance(row, str):
+            bad.setdefault(row, []).append(f"line {number}: {line}")
+            continue
+        numbers.append(number)
+        stamps.append(int(fields[0].partition(".")[0]))
+        rows.append(row)
+    for reason, examples in bad.items():
+        drops.add(sensor, reason, len(examples), examples[0])
+    values: dict[Column, NDArray[Any]] = {}
+    for index, column in enumerate(placed):
+        if column is not None:
+            cells = [row[index] for row in rows]
+            values[column] = np.array(cells, dtype=np.str_ if column.text else np.float64)
+    return Rows(where, np.array(stamps, dtype=np.int64), values, text, np.array(numbers, dtype=np.int64))
+
+
+def _parse_row(fields: list[str], placed: list[Column | None], width: int, needed: int) -> list[Any] | str:
+    """Values of a row in the order of the file, or the reason why it cannot be used."""
+    if len(fields) < needed:
+        return f"row too short (needs {needed} values)"
+    if len(fields) > width:
+        return f"row too long (the file has {width} columns)"
+    if not _WHOLE.fullmatch(fields[0]) or abs(int(fields[0].partition(".")[0])) >= STAMP_LIMIT:
+        return "timestamp is not a whole number of nanoseconds below 2**62"
+    row: list[Any] = []
+    for column, cell in zip(placed, [*fields[1:], *[""] * (width - len(fields))], strict=True):
+        if column is None or column.text:
+            row.append(cell)
+        elif not cell:
+            row.append(np.nan)
+        elif _NUMBER.fullmatch(cell):
+            row.append(float(cell))
+        else:
+            return "not a number"
+    return row
