@@ -18,7 +18,7 @@ def main() -> int:
             file=sys.stderr,
         )
         return 2
-    return cli.main() or 0
+    return cli.main()
 
 
 if __name__ == "__main__":
