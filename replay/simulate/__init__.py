@@ -1,0 +1,1 @@
+"""Simulation: rendered camera frames of tunnel walls, and the corridor flights around them."""
