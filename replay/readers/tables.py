@@ -1,4 +1,4 @@
-"""Rows of a file to the arrays that the filter reads: vectors stacked, anchors numbered, stamps at the window's middle."""
+"""Rows of a file to the arrays that the filter reads: vectors stacked, anchors numbered, flow at mid-window."""
 
 from __future__ import annotations
 
