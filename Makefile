@@ -22,8 +22,9 @@ help:
 	@echo "make clean         remove what the commands above have made, .venv included"
 
 $(BIN)/python:
+	@command -v $(PYTHON) > /dev/null || { echo "axialnav needs Python 3.11 or newer, but there is no $(PYTHON); say which one to use: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(v < (3, 11) and "axialnav needs Python 3.11 or newer, but $(PYTHON) is %d.%d; say which one to use: make PYTHON=python3.12" % v[:2])'
-	@$(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
 $(INSTALLED): pyproject.toml | $(BIN)/python
 	@echo "installing axialnav into $(VENV), once; this takes a minute or two"
