@@ -19,6 +19,7 @@ from axialnav.fusion.readings import Reading
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
+ANCHOR_FIELDS = ("anchor", "anchor_a", "anchor_b")
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,29 @@ class SensorTable:
 
     def __len__(self) -> int:
         return len(self.t_ns)
+
+    def renumbered(self, anchors: tuple[str, ...]) -> SensorTable:
+        """The same UWB rows with index columns that refer to another list of anchors.
+
+        Needed where a configuration replaces the flight's own description of the sensor.
+        """
+        if anchors == self.anchors:
+            return self
+        places = {name: index for index, name in enumerate(anchors)}
+        fields = [name for name in ANCHOR_FIELDS if name in self.columns]
+        named = [self.anchor_names(name) for name in fields]
+        index = [np.array([places.get(name, -1) for name in names], dtype=np.int64) for names in named]
+        strange = np.flatnonzero(np.any([part < 0 for part in index], axis=0)) if index else np.zeros(0, dtype=np.int64)
+        unlisted = {row: tuple(str(names[row]) for names in named) for row in strange.tolist()}
+        columns = {**self.columns, **dict(zip(fields, index, strict=True))}
+        return SensorTable(self.t_ns, columns, anchors, unlisted)
+
+    def anchor_names(self, column: str) -> list[str]:
+        """Anchor of every row by name, from the index column ``anchor``, ``anchor_a`` or ``anchor_b``."""
+        fields = [name for name in ANCHOR_FIELDS if name in self.columns]
+        place = fields.index(column)
+        index = self.columns[column].tolist()
+        return [self.anchors[i] if i >= 0 else self.unlisted[row][place] for row, i in enumerate(index)]
 
 
 @dataclass(frozen=True)

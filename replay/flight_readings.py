@@ -21,9 +21,7 @@ from axialnav.fusion.readings import (
     WallRange,
 )
 from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, BlurMeter, Flow, Imu, RangeFinder, Uwb
-from axialnav.replay.flight import Flight, SensorTable
-
-_ANCHOR_FIELDS = ("anchor", "anchor_a", "anchor_b")
+from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable
 
 
 def merge_readings(flight: Flight) -> Iterator[Reading]:
@@ -65,12 +63,7 @@ def _maker(kind: type[Reading], sensor: str, table: SensorTable) -> Callable[[in
     """Function that builds the reading of a row."""
     t_ns = table.t_ns.tolist()
     columns = {name: [_plain(value) for value in array.tolist()] for name, array in table.columns.items()}
-    anchor_fields = [name for name in _ANCHOR_FIELDS if name in columns]
-    for position, name in enumerate(anchor_fields):
-        columns[name] = [
-            table.anchors[index] if index >= 0 else table.unlisted[row][position]
-            for row, index in enumerate(columns[name])
-        ]
+    columns |= {name: table.anchor_names(name) for name in ANCHOR_FIELDS if name in columns}
 
     def make(row: int) -> Reading:
         fields: dict[str, Any] = {name: values[row] for name, values in columns.items()}

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.errors import FlightError
 from axialnav.fusion.strict_toml import dump
 from axialnav.models.rig import AnySensor, Camera, Flow, Gps, Uwb
-from axialnav.replay.flight import Flight, SensorTable, Stamps
+from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable, Stamps
 from axialnav.replay.readers import columns as c
 from axialnav.replay.readers.flight_folder import TRUTH_FOLDER
 from axialnav.replay.readers.sensor_yaml import FORMS, anchor_name
@@ -110,22 +110,20 @@ def _as_in_file(spec: AnySensor, table: SensorTable) -> tuple[Stamps, dict[str, 
         order = np.argsort(t_ns, kind="stable")
         return t_ns[order], {name: array[order] for name, array in columns.items()}
     if isinstance(spec, Uwb):
-        fields = [name for name in columns if name.startswith("anchor")]
-        for position, field in enumerate(fields):
-            names = np.array([*(_safe(name) for name in table.anchors), ""], dtype=object)[columns[field]]
-            for row, unlisted in table.unlisted.items():
-                if columns[field][row] < 0:
-                    names[row] = _safe(unlisted[position])
-            columns[field] = names
+        for field in ANCHOR_FIELDS:
+            if field in columns:
+                names = table.anchor_names(field)
+                for name in set(names):
+                    _require_writable(name)
+                columns[field] = np.array(names, dtype=np.str_)
     return table.t_ns, columns
 
 
-def _safe(name: str) -> str:
+def _require_writable(name: str) -> None:
     if not name or _UNSAFE & set(name) or anchor_name(name) != name:
         raise FlightError(
-            f"anchor {name!r} cannot stand in a CSV file; give it a name without commas, # or spaces around"
+            f"anchor {name!r} cannot stand in a CSV file; give it a name without commas, # or outer spaces"
         )
-    return name
 
 
 def _write_csv(path: Path, layout: c.Layout, t_ns: Stamps, columns: Mapping[str, NDArray[Any]]) -> None:
@@ -137,7 +135,7 @@ def _write_csv(path: Path, layout: c.Layout, t_ns: Stamps, columns: Mapping[str,
             headers.append(column.name)
             texts.append(map(str, array.tolist()))
         elif column.required or not np.isnan(array).all():
-            headers.append(column.header if column.unit or column.name.startswith("q_") else column.name)
+            headers.append(column.header)
             texts.append(map(repr, array.tolist()))
     lines = map(",".join, zip(*texts, strict=True))
     with path.open("w", encoding="utf-8", newline="\n") as file:

@@ -82,10 +82,9 @@ IMU = (
     *_vector("gyro_rad_s", "w_RS_S_*", "rad s^-1", MAX_RATE_RAD_S, "w* w_* gyro_* gyr_* omega_* angular_velocity_*"),
     *_vector("accel_m_s2", "a_RS_S_*", "m s^-2", MAX_ACCEL_M_S2, "a* a_* accel_* acc_* linear_acceleration_*"),
 )
-CAMERA = (
-    Column("filename", "filename", text=True),
-    Column("exposure_s", "exposure", "s", SMALLEST, 10.0, required=False),
-)
+_EXPOSURE = Column("exposure_s", "exposure", "s", SMALLEST, 10.0, required=False)
+CAMERA = (Column("filename", "filename", text=True), _EXPOSURE)
+CAMERA_VIDEO = (Column("filename", "filename", required=False, text=True), _EXPOSURE)
 FLOW = (
     _WINDOW,
     Column("dx_px", "dx", "px", -1e5, 1e5),

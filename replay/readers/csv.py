@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def read_rows(path: Path, layout: Layout, sensor: str, drops: DropLog) -> Rows:
     header, first = _head(text)
     if first is None:
         return _no_rows(where, text)
-    width = len(header) if header else len(_fields(first))
+    width = _width(header, text)
     placed = place_columns(header, width, layout, where)
     for index, column in enumerate(placed):
         if column is None:
@@ -119,6 +120,12 @@ def _head(text: str) -> tuple[list[tuple[str, str]] | None, str | None]:
         else:
             return header, line
     return header, None
+
+
+def _width(header: list[tuple[str, str]] | None, text: str) -> int:
+    """Columns of the file: those of the header, or more where the first rows agree on more."""
+    counts = sorted(len(_fields(line)) for _, line in islice(_data_lines(text), 5))
+    return max(len(header or ()), counts[len(counts) // 2])
 
 
 def _is_header(line: str) -> bool:
@@ -175,7 +182,8 @@ def _parse_slow(text: str, placed: list[Column | None], where: str, sensor: str,
     stamps: list[int] = []
     rows: list[list[Any]] = []
     width = len(placed) + 1
-    needed = 1 + max((i for i, column in enumerate(placed, start=1) if column is not None and column.required))
+    places = [i for i, column in enumerate(placed, start=1) if column is not None and column.required]
+    needed = 1 + max(places, default=0)
     for number, line in _data_lines(text):
         fields = _fields(line)
         row = _parse_row(fields, placed, width, needed)

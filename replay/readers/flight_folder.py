@@ -19,6 +19,7 @@ from axialnav.replay.readers.flight_toml import FlightToml, read_flight_toml
 from axialnav.replay.readers.rows import usable_rows
 from axialnav.replay.readers.sensor_yaml import read_sensor_yaml
 from axialnav.replay.readers.tables import gps_of, layout_of, sensor_table, truth_of
+from axialnav.replay.readers.units import check_imu_units
 
 TRUTH_FOLDER = "state_groundtruth_estimate0"
 _NUMBER = re.compile(r"(\d+)")
@@ -32,7 +33,13 @@ def read_flight_folder(path: Path) -> Flight:
     FlightError
         No flight there, a file that cannot be understood, or neither IMU samples nor camera frames in it.
     """
-    root, mav0 = _locate(path)
+    try:
+        return _read(*_locate(path))
+    except OSError as error:
+        raise FlightError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
+def _read(root: Path, mav0: Path) -> Flight:
     drops = DropLog()
     toml = read_flight_toml(root / "flight.toml")
     specs, tables, gps = _read_sensors(mav0, drops)
@@ -91,6 +98,8 @@ def _read_sensors(
                 drops.add(name, "a second GPS reference, not used", len(rows.t_ns), name)
             continue
         tables[name] = sensor_table(spec, rows, name, drops)
+        if isinstance(spec, Imu):
+            check_imu_units(rows, tables[name], name, drops)
         if isinstance(spec, Imu) and span_ns is None and len(rows.t_ns):
             span_ns = int(rows.t_ns[0]), int(rows.t_ns[-1])
     return specs, tables, gps
@@ -98,11 +107,13 @@ def _read_sensors(
 
 def _read_sensor(folder: Path, spec: AnySensor, drops: DropLog, span_ns: tuple[int, int] | None) -> Rows:
     layout, name = layout_of(spec), folder.name
+    video = isinstance(spec, Camera) and any(folder.glob("video.*"))
+    layout = columns.CAMERA_VIDEO if video else layout
     rows = _read_file(folder, layout, drops)
     if rows is None:
         return Rows(name, np.zeros(0, dtype=np.int64), {})
     rows = usable_rows(rows, layout, name, drops, span_ns)
-    if isinstance(spec, Camera):
+    if isinstance(spec, Camera) and not video:
         rows = _with_images(folder, rows, drops)
     if not len(rows.t_ns):
         drops.add(name, "no usable row", 1, "data.csv")
@@ -118,9 +129,9 @@ def _read_file(folder: Path, layout: columns.Layout, drops: DropLog) -> Rows | N
 
 
 def _with_images(folder: Path, rows: Rows, drops: DropLog) -> Rows:
-    """Rows whose image file is there; a video holds all its frames."""
+    """Rows whose image file is there."""
     column = columns.CAMERA[0]
-    if column not in rows.values or any(folder.glob("video.*")):
+    if not len(rows.t_ns):
         return rows
     there = set(os.listdir(folder / "data")) if (folder / "data").is_dir() else set()
     missing = np.array([name not in there for name in rows.values[column].tolist()], dtype=np.bool_)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 
@@ -13,6 +14,7 @@ from axialnav.fusion.strict_toml import decode, parse
 from axialnav.models.rig import Surface
 
 STANDARD_GRAVITY_M_S2 = 9.80665
+AXIS_TOLERANCE = 1e-3
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -70,7 +72,31 @@ def read_flight_toml(path: Path) -> FlightToml:
         table = decode(parse(text, where=str(path)), FlightToml, where=str(path))
     except (ConfigError, ValueError) as error:
         raise FlightError(" ".join(str(error).split())) from None
+    _check_numbers(table, str(path))
     start_s, end_s = table.evaluation.start_s, table.evaluation.end_s
     if start_s is not None and end_s is not None and not start_s < end_s:
         raise FlightError(f"{path}: evaluation.end_s is {end_s:g}, must be after start_s = {start_s:g}; correct either")
     return table
+
+
+def _check_numbers(table: FlightToml, where: str) -> None:
+    """Finite numbers throughout, and an axis of length 1."""
+    name = not_finite(msgspec.to_builtins(table))
+    if name is not None:
+        raise FlightError(f"{where}: {name} must be a finite number; correct it or leave it out")
+    if table.corridor is not None:
+        length = math.hypot(*table.corridor.axis)
+        if abs(length - 1.0) > AXIS_TOLERANCE:
+            raise FlightError(
+                f"{where}: corridor.axis has length {length:.4g}, must be 1 (tolerance {AXIS_TOLERANCE}); "
+                f"divide {table.corridor.axis} by {length:.4g}"
+            )
+
+
+def not_finite(data: Any, name: str = "") -> str | None:
+    """Dotted name of the first number in nested plain data that is NaN or infinite, None if there is none."""
+    if isinstance(data, float) and not math.isfinite(data):
+        return name
+    parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list | tuple) else ()
+    found = (not_finite(value, f"{name}.{key}" if name else str(key)) for key, value in parts)
+    return next((one for one in found if one is not None), None)

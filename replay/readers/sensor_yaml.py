@@ -30,6 +30,7 @@ from axialnav.models.rig import (
     Uwb,
 )
 from axialnav.replay.readers.dropped import DropLog
+from axialnav.replay.readers.flight_toml import not_finite
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,9 @@ def read_sensor_yaml(folder: Path, drops: DropLog) -> AnySensor | None:
             folder.name, f"sensor.yaml says no `{key}`, which a {form.sensor_type} needs: left out", 1, folder.name
         )
         return None
+    strange = not_finite(msgspec.to_builtins(spec))
+    if strange is not None:
+        raise FlightError(f"{folder.name}/sensor.yaml: {strange} must be a finite number; correct it or leave it out")
     return _checked(spec, folder.name, drops)
 
 
