@@ -1,0 +1,1 @@
+"""Published blur-length methods, as faithful as their papers allow; for comparison, not for flying."""
