@@ -1,0 +1,91 @@
+"""``axialnav VERB ...``: verbs, exit codes and one-line errors.
+
+Exit codes: 0 passed, 1 a check failed, 2 usage error, 3 nothing evaluated or input not usable, 130 interrupted.
+``axialnav`` alone prints the help and is a usage error too: a script whose verb went missing must not look like
+success.  An error is one line on stderr, never a traceback; ``AXIALNAV_DEBUG=1`` in the environment shows the traceback
+to whoever looks for it.
+
+Only the command line prints.  Verbs import what they need when they run, so that ``axialnav --help`` stays fast.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from cyclopts import App
+from cyclopts.exceptions import CycloptsError
+
+from axialnav.fusion.errors import AxialnavError, ConfigError
+from axialnav.replay.cli_output import complain, emit
+from axialnav.replay.cli_replay import demo, replay
+
+PASSED, FAILED, USAGE, UNUSABLE, INTERRUPTED = 0, 1, 2, 3, 130
+DEBUG = "AXIALNAV_DEBUG"
+HELP = """Axial velocity of a UAV in a featureless tunnel, with an honest uncertainty.
+
+Exit codes: 0 passed, 1 a check failed, 2 usage error, 3 nothing evaluated or input not usable.
+"""
+
+
+def _version() -> str:
+    import axialnav
+
+    return str(axialnav.__version__)
+
+
+def build_app() -> App:
+    """The command line as a value: one command per verb, none of them loaded yet."""
+    app = App(name="axialnav", help=HELP, version=_version, help_format="plaintext", result_action="return_value")
+    for verb in (demo, replay):
+        app.command(verb)
+    return app
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb and return its exit code; ``arguments`` default to those of the process."""
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    app = build_app()
+    try:
+        if not tokens:
+            app.help_print([])
+            return USAGE
+        result = _run(app, tokens)
+        emit()
+        return result
+    except KeyboardInterrupt:
+        complain("interrupted; files written so far may be incomplete")
+        return INTERRUPTED
+    except Exception as error:  # the last line of defence: a person gets one line, not a traceback
+        if os.environ.get(DEBUG):
+            raise
+        return _explain(error)
+
+
+def _run(app: App, tokens: list[str]) -> int:
+    result: Any = app(tokens, exit_on_error=False, print_error=False)
+    return result if isinstance(result, int) else PASSED
+
+
+def _explain(error: Exception) -> int:
+    """Put an error into one line on stderr and choose the exit code."""
+    if isinstance(error, CycloptsError):
+        complain(f"{_usage_text(error)} See `axialnav --help`.")
+        return USAGE
+    if isinstance(error, AxialnavError):
+        complain(str(error))
+        return USAGE if isinstance(error, ConfigError) else UNUSABLE
+    if isinstance(error, OSError):
+        complain(f"{error.filename or 'input'}: {error.strerror or error}")
+        return UNUSABLE
+    complain(
+        f"stopped by a defect of axialnav: {type(error).__name__}: {error}; {DEBUG}=1 shows where, please report it"
+    )
+    return UNUSABLE
+
+
+def _usage_text(error: CycloptsError) -> str:
+    text = str(error).strip()
+    return text if text.endswith((".", "?", "!")) else f"{text}."

@@ -1,0 +1,118 @@
+"""The verbs ``replay`` and ``demo``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from axialnav.fusion.errors import ConfigError
+from axialnav.replay.cli_output import emit, progress_bar
+
+if TYPE_CHECKING:
+    from axialnav.replay.run import Run
+
+Names = Annotated[list[str] | None, Parameter(negative=(), consume_multiple=False)]
+
+
+def replay(
+    log: Path,
+    /,
+    *,
+    config: Path | None = None,
+    out: Path | None = None,
+    without: Names = None,
+    estimator: str = "corridor",
+    smooth: Annotated[bool, Parameter(negative=())] = False,
+    param: Names = None,
+) -> int:
+    """Run the filter over a recorded flight, print the table and write the run folder.
+
+    A flight without a reference is replayed too: the scores say NOT_EVALUATED and the exit code stays 0, because the
+    replay itself was done. Exit code 3 means that nothing could be replayed.
+
+    Parameters
+    ----------
+    log
+        Flight folder.
+    config
+        TOML file with settings; what it leaves open comes from the flight. The config.toml of a run folder repeats
+        that run to the last bit.
+    out
+        Run folder to write; runs/<flight name> if not given.
+    without
+        Sensors to switch off, separated by commas.
+    estimator
+        Which filter: corridor.
+    smooth
+        Smooth backwards after filtering; refused by estimators that cannot.
+    param
+        One setting as NAME=VALUE, e.g. uwb.sigma_m=0.4; may be repeated.
+    """
+    from axialnav.fusion.config import Config
+    from axialnav.replay.flight import load_flight
+    from axialnav.replay.run import replay as run_replay
+
+    params = dict(map(_parameter, param or ()))
+    settings = Config.from_toml(config) if config else None
+    flight = load_flight(log)
+    folder = out or Path("runs") / _file_name(flight.name)
+    _refuse_flight_folder(folder)
+    with progress_bar(f"replay {flight.name}") as progress:
+        run = run_replay(
+            flight,
+            settings,
+            without=_names(without),
+            estimator=estimator,
+            params=params,
+            smooth=smooth,
+            progress=progress,
+        )
+    return _finish(run, folder)
+
+
+def demo(*, out: Path = Path("runs/demo")) -> int:
+    """Replay the flight that ships with axialnav and write its run folder with report.html.
+
+    Parameters
+    ----------
+    out
+        Run folder to write.
+    """
+    from axialnav.replay.run import replay as run_replay
+    from axialnav.replay.sample_flights import sample_flight_path
+
+    _refuse_flight_folder(out)
+    with progress_bar("demo") as progress:
+        run = run_replay(sample_flight_path(), progress=progress)
+    return _finish(run, out)
+
+
+def _finish(run: Run, folder: Path) -> int:
+    """Write everything first, then print: the files are there even when nobody reads the table."""
+    run.write(folder)
+    emit(run.table)
+    emit(f"report     {folder / 'report.html'}")
+    return 0
+
+
+def _names(lists: list[str] | None) -> tuple[str, ...]:
+    return tuple(name.strip() for item in lists or () for name in item.split(",") if name.strip())
+
+
+def _parameter(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name.strip() and equals and value.strip()):
+        raise ConfigError(f"--param must be NAME=VALUE like uwb.sigma_m=0.4, got {text!r}")
+    return name.strip(), value.strip()
+
+
+def _file_name(name: str) -> str:
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name).strip(".")
+    return safe or "flight"
+
+
+def _refuse_flight_folder(folder: Path) -> None:
+    if (folder / "flight.toml").exists() or (folder / "mav0").exists():
+        raise ConfigError(f"run folder {folder} holds a recorded flight; choose another with --out")

@@ -1,0 +1,115 @@
+"""Who contributed when: one row per sensor and one per condition of the estimate, over time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.outcome import Health, Verdict
+from axialnav.replay.report.figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, Figure
+from axialnav.replay.report.section import Section
+from axialnav.replay.run import Run
+
+Row = tuple[str, list[int | None], list[str]]
+BINS = 400
+COLOURS = {
+    Verdict.FUSED: GREEN,
+    Verdict.GATED: ORANGE,
+    Verdict.LATE: BLUE,
+    Verdict.BLIND: "#b9bec6",
+    Verdict.SUSPECT: PURPLE,
+    Verdict.INVALID: RED,
+}
+CONDITION = len(COLOURS)
+
+
+def build(run: Run) -> Section:
+    """Each cell has the colour of what happened to most readings in it; the pointer shows all counts."""
+    edges = np.linspace(0.0, max((run.track.t_ns[-1] - run.track.t_ns[0]) * 1e-9, 1e-3), BINS + 1)
+    rows = [*_sensor_rows(run, edges), *_condition_rows(run, edges)]
+    note = "Colour: what happened to most readings of that moment. White space: no reading. Blind is not a rejection."
+    figure = Figure(
+        _heatmap(rows, edges),
+        "",
+        _resets_caption(run),
+        height_px=110 + 34 * len(rows),
+        layout={"shapes": _reset_lines(run), "yaxis": {"autorange": "reversed", "fixedrange": True}},
+    )
+    legend = [(verdict.name.lower(), colour) for verdict, colour in COLOURS.items()]
+    return Section(
+        "Sensors over time", [figure], "strip.html.j2", note, {"legend": [*legend, ("condition of the estimate", GREY)]}
+    )
+
+
+def _sensor_rows(run: Run, edges: NDArray[np.float64]) -> list[Row]:
+    log = run.log
+    seconds = (log.t_ns - run.track.t_ns[0]) * 1e-9
+    cell = np.clip(np.searchsorted(edges, seconds, side="right") - 1, 0, BINS - 1)
+    rows = []
+    for index, name in enumerate(log.sensors):
+        mine = log.source == index
+        if not mine.any():
+            continue
+        counts = np.bincount(cell[mine] * len(Verdict) + log.verdict[mine], minlength=BINS * len(Verdict))
+        counts = counts.reshape(BINS, len(Verdict))
+        codes = [int(c) if total else None for c, total in zip(counts.argmax(1), counts.sum(1), strict=True)]
+        rows.append((name, codes, [_words(row) for row in counts.tolist()]))
+    return rows
+
+
+def _words(counts: list[int]) -> str:
+    return ", ".join(f"{verdict.name.lower()} {n}" for verdict, n in zip(Verdict, counts, strict=True) if n)
+
+
+def _condition_rows(run: Run, edges: NDArray[np.float64]) -> list[Row]:
+    seconds = (run.track.t_ns - run.track.t_ns[0]) * 1e-9
+    rows = []
+    for flag in Health:
+        hit = (run.track.flags & int(flag)) != 0
+        if flag and hit.any():
+            name = str(flag.name).replace("_", " ").lower()
+            present = np.histogram(seconds[hit], edges)[0] > 0
+            rows.append((name, [CONDITION if p else None for p in present], [name if p else "" for p in present]))
+    return rows
+
+
+def _heatmap(rows: list[Row], edges: NDArray[np.float64]) -> list[dict[str, Any]]:
+    colours = [*COLOURS.values(), GREY]
+    steps = [(i + k) / len(colours) for i in range(len(colours)) for k in (0, 1)]
+    scale = [[step, colours[i // 2]] for i, step in enumerate(steps)]
+    return [
+        {
+            "type": "heatmap",
+            "x": [round(float(x), 4) for x in 0.5 * (edges[1:] + edges[:-1])],
+            "y": [name for name, _, _ in rows],
+            "z": [codes for _, codes, _ in rows],
+            "text": [words for _, _, words in rows],
+            "hovertemplate": "%{y} at %{x:.1f} s: %{text}<extra></extra>",
+            "zmin": -0.5,
+            "zmax": len(colours) - 0.5,
+            "colorscale": scale,
+            "showscale": False,
+            "ygap": 6,
+        }
+    ]
+
+
+def _reset_seconds(run: Run) -> list[float]:
+    rows = np.flatnonzero(np.diff(run.track.resets) > 0) + 1
+    return [float(s) for s in (run.track.t_ns[rows] - run.track.t_ns[0]) * 1e-9]
+
+
+def _reset_lines(run: Run) -> list[dict[str, Any]]:
+    style = {"color": RED, "width": 1.5, "dash": "dot"}
+    at = _reset_seconds(run)[:50]
+    return [{"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": s, "x1": s, "line": style} for s in at]
+
+
+def _resets_caption(run: Run) -> str:
+    at = _reset_seconds(run)
+    if not at:
+        return "No position reset."
+    listed = ", ".join(f"{s:.1f} s" for s in at[:10])
+    return f"{len(at)} position reset{'s' * (len(at) > 1)} (dotted): {listed}{' ...' * (len(at) > 10)}"

@@ -1,0 +1,80 @@
+"""First section: the main numbers with their coverage, what stands out, and the table per sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from axialnav.replay.findings import findings, nees_verdict
+from axialnav.replay.report.section import Section
+from axialnav.replay.run import Run
+from axialnav.replay.table import COUNTS, NOT_EVALUATED, sensor_cells
+
+Card = tuple[str, str, str]
+TIPS = {
+    "available": "readings in the recording",
+    "fused": "used by the filter, some with reduced weight",
+    "gated": "refused: too far from the prediction",
+    "late": "older than the filter can reach back",
+    "blind": "cannot inform now (blur too short, beam misses): not a rejection",
+    "suspect": "held back by the supervisor",
+    "invalid": "out of the sensor's range or nonsense",
+    "mean NIS": "normalised innovation squared per degree of freedom, gated ones at the gate; 1 is honest",
+    "lag-1": "correlation of neighbouring innovations; 0 is white",
+    "time-outs": "not fused for longer than the time-out",
+}
+
+
+def build(run: Run) -> Section:
+    """Numbers without a reference read NOT_EVALUATED and never 0."""
+    metrics = run.metrics
+    sensors = [(name, sensor_cells(sensor)) for name, sensor in metrics["sensors"].items()]
+    values = {
+        "cards": cards(metrics),
+        "findings": findings(metrics),
+        "heads": [*COUNTS, "mean NIS", "lag-1", "time-outs"],
+        "tips": TIPS,
+        "sensors": sensors,
+    }
+    return Section("Verdict and coverage", template="verdict.html.j2", values=values)
+
+
+def cards(metrics: dict[str, Any]) -> list[Card]:
+    """Label, value and remark of each main number."""
+    return [*_coverage(metrics), *_axial(metrics), *_consistency(metrics), *_position(metrics), *_speed(metrics)]
+
+
+def _coverage(metrics: dict[str, Any]) -> Iterator[Card]:
+    used, available, kind = (metrics["reference"][key] for key in ("used", "available", "kind"))
+    share = f"{100.0 * used / available:.0f} %" if available else NOT_EVALUATED
+    yield "scored samples", share, f"{used} of {available}, reference: {kind}"
+
+
+def _axial(metrics: dict[str, Any]) -> Iterator[Card]:
+    axial = metrics["axial_velocity_m_s"]
+    if axial["rmse"] is None:
+        yield "axial velocity RMS", NOT_EVALUATED, "no ground truth"
+        return
+    remark = f"bias {axial['mean_error']:+.3f}, max {axial['max_abs_error']:.2f}"
+    yield "axial velocity RMS", f"{axial['rmse']:.3f} m/s", remark
+    yield "within 3 sigma", f"{100.0 * axial['in_3_sigma']:.1f} %", f"mean sigma {axial['mean_sigma']:.3f} m/s"
+
+
+def _consistency(metrics: dict[str, Any]) -> Iterator[Card]:
+    if metrics["nees_velocity"] is not None:
+        low, high = metrics["nees_velocity_band"]
+        remark = f"{nees_verdict(metrics)}: 95 % band {low:.2f} to {high:.2f}"
+        yield "velocity NEES", f"{metrics['nees_velocity']:.2f}", remark
+
+
+def _position(metrics: dict[str, Any]) -> Iterator[Card]:
+    if metrics["position_rmse_3d_m"] is not None:
+        axes = " ".join(f"{value:.3f}" for value in metrics["position_rmse_m"])
+        yield "position RMS, 3-D", f"{metrics['position_rmse_3d_m']:.3f} m", f"x y z {axes}"
+
+
+def _speed(metrics: dict[str, Any]) -> Iterator[Card]:
+    if metrics["horizontal_speed_rmse_m_s"] is not None:
+        late = metrics["gps_latency_s"]
+        remark = "against GPS" if late is None else f"against GPS, which is about {late:.2f} s late"
+        yield "horizontal speed RMS", f"{metrics['horizontal_speed_rmse_m_s']:.3f} m/s", remark

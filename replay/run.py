@@ -1,0 +1,144 @@
+"""Replay of a recorded flight: the same filter as in flight, fed from tables instead of drivers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.errors import ConfigError, FlightError
+from axialnav.fusion.outcome import InnovationLog, Track
+from axialnav.replay.flight import Flight, load_flight
+from axialnav.replay.fused import Column, digest, fused_columns
+
+ESTIMATORS = ("corridor",)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A replayed flight.
+
+    Attributes
+    ----------
+    flight
+        What was replayed.
+    config
+        Fully resolved; replaying with it gives the same digest.
+    track, log
+        The estimate at every IMU sample, and one record per other reading.
+    columns
+        Columns of ``fused.csv`` in file order.
+    metrics
+        The dictionary of ``metrics.json``.
+    """
+
+    flight: Flight
+    config: Config
+    track: Track
+    log: InnovationLog
+    columns: dict[str, Column]
+    metrics: dict[str, Any]
+
+    @property
+    def table(self) -> str:
+        """The summary that the command line prints."""
+        from axialnav.replay.table import summary
+
+        return summary(self)
+
+    def write(self, folder: str | Path) -> Path:
+        """Write the run folder; see :func:`axialnav.replay.run_folder.write_run_folder`."""
+        from axialnav.replay.run_folder import write_run_folder
+
+        return write_run_folder(self, folder)
+
+
+def replay(
+    flight: Flight | str | Path,
+    config: Config | None = None,
+    *,
+    without: Sequence[str] = (),
+    estimator: str = "corridor",
+    params: Mapping[str, str] | None = None,
+    smooth: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run the filter over a recorded flight and score it where there is a reference.
+
+    Parameters
+    ----------
+    flight
+        A loaded flight, or the path of one.
+    config
+        Settings; what it leaves open (sensors, surfaces, corridor, first state) comes from the flight.
+    without
+        Names of sensors to switch off.
+    estimator
+        ``"corridor"``: the 18-state filter.
+    params
+        Single settings by dotted name, values as TOML text: ``{"uwb.sigma_m": "0.4"}``.
+    smooth
+        Not offered by any estimator of this version; True is refused.
+    progress
+        Called with the share done, 0 .. 1.
+
+    Raises
+    ------
+    ConfigError
+        Unknown setting, sensor or estimator.
+    FlightError
+        The flight cannot be replayed: unreadable, or without IMU samples.
+    """
+    from axialnav.replay.metrics import score
+
+    _refuse_unknown(estimator, smooth)
+    started = time.perf_counter()
+    loaded = flight if isinstance(flight, Flight) else load_flight(flight)
+    resolved = resolve(config, loaded, without=without, params=params)
+    track, log, kernel_s = _filter(loaded, resolved, progress)
+    columns = fused_columns(track, resolved.corridor)
+    scores = score(track, log, loaded, resolved)
+    head = {"flight": loaded.name, "estimator": estimator, "digest": digest(columns)}
+    timing = _timing(track, kernel_s, time.perf_counter() - started)
+    return Run(loaded, resolved, track, log, columns, {**head, **scores, "timing": timing})
+
+
+def resolve(
+    config: Config | None, flight: Flight, *, without: Sequence[str] = (), params: Mapping[str, str] | None = None
+) -> Config:
+    """Settings as the filter will see them: defaults, then the flight, then ``config``, ``params`` and ``without``."""
+    resolved = (config or Config()).with_defaults_from(flight.config)
+    if params:
+        resolved = resolved.with_params(dict(params))
+    return resolved.without(tuple(without)) if without else resolved
+
+
+def _refuse_unknown(estimator: str, smooth: bool) -> None:
+    if estimator not in ESTIMATORS:
+        raise ConfigError(f"no estimator named {estimator!r}; there is {', '.join(ESTIMATORS)}")
+    if smooth:
+        raise ConfigError("smoothing is not available; replay without it (the corridor estimator filters forward)")
+
+
+def _filter(
+    flight: Flight, config: Config, progress: Callable[[float], None] | None
+) -> tuple[Track, InnovationLog, float]:
+    from axialnav.fusion.batch import run_batch
+
+    result = run_batch(config, flight.tables, progress)
+    if result.track.t_ns.size == 0:
+        raise FlightError(f"flight {flight.name}: no IMU sample to replay; the filter needs an imu0 table")
+    return result.track, result.log, result.kernel_s
+
+
+def _timing(track: Track, kernel_s: float, wall_s: float) -> dict[str, float]:
+    flight_s = float(track.t_ns[-1] - track.t_ns[0]) * 1e-9
+    return {
+        "wall_s": wall_s,
+        "flight_s": flight_s,
+        "real_time_factor": flight_s / wall_s,
+        "kernel_us_per_imu": kernel_s * 1e6 / track.t_ns.size,
+    }
