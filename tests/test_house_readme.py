@@ -47,3 +47,11 @@ def test_a_failing_example_is_noticed_and_shown(tmp_path: Path, capsys: pytest.C
 def test_links_between_pages_lead_somewhere(page: Path) -> None:
     targets = re.findall(r"\]\((?!https?://|#|mailto:)([^)#\s]+)", page.read_text(encoding="utf-8"))
     assert [t for t in targets if not (page.parent / t).exists()] == []
+
+
+def test_every_make_command_that_a_page_names_exists() -> None:
+    targets = set(re.findall(r"^([a-z][a-z -]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    known = {word for line in targets for word in line.split()}
+    named = {t for page in PAGES for t in re.findall(r"(?:`|\$ )make ([a-z-]+)", page.read_text(encoding="utf-8"))}
+    assert {"demo", "test", "bench"} <= named
+    assert named <= known
