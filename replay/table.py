@@ -131,11 +131,13 @@ def _nees(metrics: dict[str, Any]) -> str:
 
 
 def _condition(metrics: dict[str, Any]) -> Iterator[str]:
-    words = [f"{name.replace('_', ' ')} {100.0 * share:.1f} %" for name, share in metrics["health"].items()]
+    words = [
+        f"{name.replace('_', ' ')} {100.0 * share:.1f} % of the flight" for name, share in metrics["health"].items()
+    ]
     if metrics["resets"]:
         words.append(f"{metrics['resets']} position reset{'s' * (metrics['resets'] > 1)}")
     if words:
-        yield f"condition  {', '.join(words)} of the flight" if metrics["health"] else f"condition  {', '.join(words)}"
+        yield f"condition  {', '.join(words)}"
 
 
 def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> Iterator[str]:

@@ -19,6 +19,7 @@ BLUE, ORANGE, GREEN, RED = "#3b82d6", "#e0851b", "#2fa36b", "#dc4b4b"
 PURPLE, GREY = "#9a6bd8", "#8b929c"
 AXIS_COLOURS = (BLUE, ORANGE, GREEN)
 MAX_BAND_STRETCHES = 40
+TIME = "time after the first IMU sample [s]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +29,19 @@ class Figure:
     traces: Sequence[Trace]
     y_title: str
     caption: str = ""
-    x_title: str = "time after the first IMU sample [s]"
+    x_title: str = TIME
     height_px: int = 320
     layout: Mapping[str, Any] = field(default_factory=dict)
 
-    def as_data(self) -> dict[str, Any]:
-        """Traces and layout for the page's script, which adds the colours of paper and grid."""
+    def as_data(self, span_s: float) -> dict[str, Any]:
+        """Traces and layout for the page's script, which adds the colours of paper and grid.
+
+        Time axes all show ``span_s``, so that the plots of a page can be compared by eye.
+        """
         layout: dict[str, Any] = {"height": self.height_px, "xaxis": {"title": {"text": self.x_title}}}
         layout["yaxis"] = {"title": {"text": self.y_title}}
+        if self.x_title == TIME:
+            layout["xaxis"]["range"] = [0.0, span_s]
         for key, value in self.layout.items():
             layout[key] = {**layout[key], **value} if isinstance(layout.get(key), dict) else value
         return {"traces": list(self.traces), "layout": layout}

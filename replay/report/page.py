@@ -37,7 +37,11 @@ def render_report(run: Run) -> str:
     )
     sections = [section for module in SECTIONS if (section := module.build(run))]
     figures: list[dict[str, Any]] = []
-    bodies = [environment.get_template(s.template).render(numbered=_numbered(s, figures), **s.values) for s in sections]
+    span_s = run.metrics["timing"]["flight_s"]
+    bodies = [
+        environment.get_template(s.template).render(numbered=_numbered(s, figures, span_s), **s.values)
+        for s in sections
+    ]
     return environment.get_template("page.html.j2").render(
         title=run.flight.name,
         sections=list(zip(sections, bodies, strict=True)),
@@ -48,10 +52,10 @@ def render_report(run: Run) -> str:
     )
 
 
-def _numbered(section: Section, figures: list[dict[str, Any]]) -> list[tuple[int, Any]]:
+def _numbered(section: Section, figures: list[dict[str, Any]], span_s: float) -> list[tuple[int, Any]]:
     """Give every figure of a section its number on the page and collect its data."""
     result = []
     for figure in section.figures:
         result.append((len(figures), figure))
-        figures.append(figure.as_data())
+        figures.append(figure.as_data(span_s))
     return result
