@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from axialnav.fusion.errors import ConfigError
 
 Array = NDArray[np.float64]
-NEWTON_STEPS = 20
-MAX_MISS = 1e-9  # of the solved radius [focal lengths]
+BISECTIONS = 40  # 1e-11 focal lengths
+MAX_RADIUS = 20.0  # [focal lengths]: 87 degrees off the axis
+MAX_SHARE_OF_FOLD = 0.98
 
 
 def half_spectrum(samples: int, pitch_px: float) -> Array:
@@ -77,7 +78,7 @@ def fixed_pattern(
 def undistorted(u_px: Array, v_px: Array, focal_px: float, k1: float, k2: float) -> tuple[Array, Array]:
     """Pinhole coordinates of distorted pixels, both relative to the principal point [px].
 
-    Solves ``r_d = r (1 + k1 r^2 + k2 r^4)`` (Brown's radial terms, radius in focal lengths) by Newton steps.
+    Solves ``r_d = r (1 + k1 r^2 + k2 r^4)`` (Brown's radial terms, radius in focal lengths) by bisection.
 
     Raises
     ------
@@ -87,17 +88,23 @@ def undistorted(u_px: Array, v_px: Array, focal_px: float, k1: float, k2: float)
     if not (k1 or k2):
         return u_px, v_px
     distorted = np.hypot(u_px, v_px) / focal_px
-    radius = distorted.copy()
-    for _ in range(NEWTON_STEPS):
-        square = radius**2
-        slope = 1.0 + 3.0 * k1 * square + 5.0 * k2 * square**2
-        radius -= (radius * (1.0 + k1 * square + k2 * square**2) - distorted) / np.maximum(slope, 0.05)
-    square = radius**2
-    miss = float(np.abs(radius * (1.0 + k1 * square + k2 * square**2) - distorted).max())
-    if not (miss < MAX_MISS and float((1.0 + 3.0 * k1 * square + 5.0 * k2 * square**2).min()) > 0.0):
+    edge = _fold(k1, k2)
+    if not float(distorted.max()) < MAX_SHARE_OF_FOLD * edge * (1.0 + k1 * edge**2 + k2 * edge**4):
         raise ConfigError(
             f"the radial distortion k1 = {k1}, k2 = {k2} folds the picture over within its corners at "
             f"{distorted.max():.2f} focal lengths; use smaller coefficients or a longer focal length"
         )
-    scale = radius / np.maximum(distorted, 1e-12)
+    low, high = np.zeros_like(distorted), np.full_like(distorted, min(edge, MAX_RADIUS))
+    for _ in range(BISECTIONS):
+        radius = 0.5 * (low + high)
+        beyond = radius * (1.0 + k1 * radius**2 + k2 * radius**4) > distorted
+        low, high = np.where(beyond, low, radius), np.where(beyond, radius, high)
+    scale = low / np.maximum(distorted, 1e-12)
     return u_px * scale, v_px * scale
+
+
+def _fold(k1: float, k2: float) -> float:
+    """Radius at which the distorted radius stops to grow [focal lengths]."""
+    roots = np.roots([5.0 * k2, 3.0 * k1, 1.0]) if k2 else np.array([-1.0 / (3.0 * k1)])
+    real = [float(root.real) for root in roots if abs(root.imag) < 1e-12 and root.real > 0.0]
+    return float(np.sqrt(min(real))) if real else MAX_RADIUS

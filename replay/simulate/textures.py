@@ -13,6 +13,7 @@ from axialnav.fusion.errors import ConfigError
 FOLDER = Path(__file__).parent / "textures"
 NAMES = ("concrete", "near_blank", "plaster", "rock")
 SHADING_SHARE = 8  # shading slower than width / SHADING_SHARE belongs to the photographer's lamp, not to the wall
+THUMBNAIL = 16  # shading is found on a picture this much smaller
 
 
 def load_texture(name: str) -> NDArray[np.float32]:
@@ -44,7 +45,10 @@ def load_texture(name: str) -> NDArray[np.float32]:
 
 def standardised(grey: NDArray[np.float32]) -> NDArray[np.float32]:
     """Grey photograph (h, w) [DN] without slow shading, zero mean and unit variance [-]."""
-    shading = cv2.GaussianBlur(grey, (0, 0), grey.shape[1] / SHADING_SHARE)
+    size = (max(1, grey.shape[1] // THUMBNAIL), max(1, grey.shape[0] // THUMBNAIL))
+    thumbnail = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+    smooth = cv2.GaussianBlur(thumbnail, (0, 0), size[0] / SHADING_SHARE)
+    shading = cv2.resize(smooth, grey.shape[::-1], interpolation=cv2.INTER_LINEAR)
     texture = grey - shading
     texture -= texture.mean()
     return np.asarray(texture / texture.std(), dtype=np.float32)
