@@ -56,4 +56,4 @@ def unusable(image: ArrayLike) -> str:
 def grey(image: ArrayLike) -> NDArray[np.float32]:
     """Picture (h, w) as float32 without its mean [DN]."""
     picture = np.asarray(image, dtype=np.float32)
-    return picture - picture.mean()
+    return np.asarray(picture - picture.mean(), dtype=np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -84,7 +85,7 @@ def dark_lines(binary: NDArray[np.uint8]) -> NDArray[np.float64]:
     columns = _vertical_lines(edges, VOTES_SHARE * binary.shape[0])
     bounds = np.concatenate([[0], columns, [binary.shape[1]]])
     brightness = binary.mean(axis=0)
-    segments = np.array([brightness[a:b].mean() for a, b in zip(bounds[:-1], bounds[1:], strict=True)])
+    segments = np.array([brightness[a:b].mean() for a, b in pairwise(bounds)])
     dark = np.flatnonzero((segments[1:-1] < segments[:-2]) & (segments[1:-1] < segments[2:])) + 1
     centre = binary.shape[1] // 2
     lines = 0.5 * (bounds[dark] + bounds[dark + 1] - 1)
