@@ -38,7 +38,14 @@ def _version() -> str:
 
 def build_app() -> App:
     """The command line as a value: one command per verb, none of them loaded yet."""
-    app = App(name="axialnav", help=HELP, version=_version, help_format="plaintext", result_action="return_value")
+    app = App(
+        name="axialnav",
+        help=HELP,
+        version=_version,
+        help_format="plaintext",
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+    )
     for verb in (demo, replay):
         app.command(verb)
     return app

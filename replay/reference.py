@@ -62,12 +62,12 @@ def in_window(
 ) -> NDArray[np.bool_]:
     """Which stamps lie in the scoring window, given in seconds after the first IMU sample (None: open)."""
     start_s, end_s = evaluation
-    seconds = (t_ns - first_ns) * 1e-9
+    # whole nanoseconds: a sample on the edge of the window belongs to it
     inside: NDArray[np.bool_] = np.ones(t_ns.size, dtype=bool)
     if start_s is not None:
-        inside &= seconds >= start_s
+        inside &= t_ns - first_ns >= round(start_s * 1e9)
     if end_s is not None:
-        inside &= seconds <= end_s
+        inside &= t_ns - first_ns <= round(end_s * 1e9)
     return inside
 
 
