@@ -90,12 +90,13 @@ def read_rows(path: Path, layout: Layout, sensor: str, drops: DropLog) -> Rows:
     if first is None:
         return _no_rows(where, text)
     width = _width(header, text)
-    placed = place_columns(header, width, layout, where)
+    placed = place_columns(header, width, layout, where, drops)
     for index, column in enumerate(placed):
         if column is None:
             name = header[index + 1][0] if header and index + 1 < len(header) else f"column {index + 2}"
             drops.add(sensor, "column not known, not used", 1, name or f"column {index + 2}")
-    fast = _parse_fast(path, placed)
+    # numpy's parser (2.4) can crash on characters beyond the basic plane in an integer field, so it gets ASCII alone
+    fast = _parse_fast(path, placed) if text.isascii() else None
     if fast is not None:
         return Rows(where, fast[0], fast[1], text)
     return _parse_slow(text, placed, where, sensor, drops)
@@ -114,7 +115,7 @@ def _head(text: str) -> tuple[list[tuple[str, str]] | None, str | None]:
             continue
         names = split_header(line)
         if line.startswith("#"):
-            header = names if len(names) > 1 and names[0][0] in STAMP_NAMES else header
+            header = names if any(name in STAMP_NAMES for name, _ in names) else header
         elif _is_header(line):
             header = names
         else:

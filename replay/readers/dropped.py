@@ -7,6 +7,12 @@ from axialnav.replay.flight import Drop
 EXAMPLE_LENGTH = 80
 
 
+def one_line(text: str) -> str:
+    """The text on one line that a terminal can show: white space folded, other control characters escaped."""
+    folded = " ".join(text.split())
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in folded)
+
+
 class DropLog:
     """Grows while a recording is read; :meth:`as_tuple` gives the result."""
 
@@ -16,7 +22,7 @@ class DropLog:
     def add(self, sensor: str, reason: str, count: int, example: str) -> None:
         """Note ``count`` cases of ``reason``; nothing is noted for a count of zero."""
         if count:
-            shown = " ".join(example.split())
+            shown = one_line(example)
             if len(shown) > EXAMPLE_LENGTH:
                 shown = shown[: EXAMPLE_LENGTH - 3] + "..."
             self._drops.append(Drop(sensor, reason, int(count), shown))

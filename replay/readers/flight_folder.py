@@ -14,7 +14,7 @@ from axialnav.models.rig import AnySensor, Camera, Gps, Imu
 from axialnav.replay.flight import Flight, GpsReference, SensorTable, Truth
 from axialnav.replay.readers import columns
 from axialnav.replay.readers.csv import Rows, read_rows
-from axialnav.replay.readers.dropped import DropLog
+from axialnav.replay.readers.dropped import DropLog, one_line
 from axialnav.replay.readers.flight_toml import FlightToml, read_flight_toml
 from axialnav.replay.readers.rows import usable_rows
 from axialnav.replay.readers.sensor_yaml import read_sensor_yaml
@@ -35,6 +35,8 @@ def read_flight_folder(path: Path) -> Flight:
     """
     try:
         return _read(*_locate(path))
+    except FlightError as error:
+        raise FlightError(one_line(str(error))) from None
     except OSError as error:
         raise FlightError(f"{path}: cannot be read: {error.strerror or error}") from None
 

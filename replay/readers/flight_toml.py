@@ -71,7 +71,7 @@ def read_flight_toml(path: Path) -> FlightToml:
     try:
         table = decode(parse(text, where=str(path)), FlightToml, where=str(path))
     except (ConfigError, ValueError) as error:
-        raise FlightError(" ".join(str(error).split())) from None
+        raise FlightError(str(error)) from None
     _check_numbers(table, str(path))
     start_s, end_s = table.evaluation.start_s, table.evaluation.end_s
     if start_s is not None and end_s is not None and not start_s < end_s:

@@ -7,6 +7,7 @@ import re
 
 from axialnav.fusion.errors import FlightError
 from axialnav.replay.readers.columns import Column, Layout
+from axialnav.replay.readers.dropped import DropLog
 
 STAMP_NAMES = ("timestamp", "t", "time", "t_ns", "stamp", "timestamp_ns")
 _NAME_AND_UNIT = re.compile(r"^(?P<name>[^\[(]*)(?:[\[(](?P<unit>[^\])]*)[\])])?")
@@ -40,11 +41,13 @@ def split_header(text: str) -> list[tuple[str, str]]:
     return pairs
 
 
-def place_columns(header: list[tuple[str, str]] | None, width: int, layout: Layout, where: str) -> list[Column | None]:
+def place_columns(
+    header: list[tuple[str, str]] | None, width: int, layout: Layout, where: str, drops: DropLog
+) -> list[Column | None]:
     """Say for every column of the file after the stamp which :class:`Column` it is, None for unknown ones.
 
-    Columns are found by name.  Where no required name is known, or there is no header, the required columns are taken
-    in their documented order, as EuRoC readers do.
+    Columns are found by name.  Where there is no header, or only strange names stand where the required columns belong,
+    these are taken in their documented order, as EuRoC readers do; strange names are noted.
 
     Parameters
     ----------
@@ -53,7 +56,9 @@ def place_columns(header: list[tuple[str, str]] | None, width: int, layout: Layo
     width
         Number of columns of the file, stamp included.
     where
-        File name for messages.
+        Sensor and file name, for messages.
+    drops
+        Where strange names are noted.
 
     Raises
     ------
@@ -68,12 +73,15 @@ def place_columns(header: list[tuple[str, str]] | None, width: int, layout: Layo
     names = [name for name, _ in header[1:]] if header else []
     placed: list[Column | None] = [_find(name, layout) for name in names]
     missing = [column for column in required if column not in placed]
-    if missing and (not header or len(missing) == len(required)):
+    if missing and (not header or not any(placed[: len(required)])):
         if width - 1 < len(required):
             raise FlightError(
                 f"{where}: {width} columns, needs at least {len(required) + 1}: "
                 f"{', '.join(['timestamp', *(column.name for column in required)])}"
             )
+        if names:
+            reason = "names in the header not known: taken in the documented order"
+            drops.add(where.partition("/")[0], reason, 1, names[0])
         free = [column if column not in required else None for column in placed[len(required) :]]
         placed = [*required, *free]
         missing = []

@@ -104,11 +104,10 @@ def read_sensor_yaml(folder: Path, drops: DropLog) -> AnySensor | None:
     except msgspec.ValidationError as error:
         lacking = _FIELD.search(str(error))
         if lacking is None:
-            raise FlightError(f"{folder.name}/sensor.yaml: {_plain_words(str(error), form)}") from None
+            raise FlightError(f"{folder.name}/sensor.yaml: {_plain_words(str(error), form, plain)}") from None
         key = {v: k for k, v in form.rename.items()}.get(lacking["field"], lacking["field"])
-        drops.add(
-            folder.name, f"sensor.yaml says no `{key}`, which a {form.sensor_type} needs: left out", 1, folder.name
-        )
+        reason = f"sensor.yaml says no `{key}`, which sensor_type {form.sensor_type} needs: left out"
+        drops.add(folder.name, reason, 1, folder.name)
         return None
     strange = not_finite(msgspec.to_builtins(spec))
     if strange is not None:
@@ -184,8 +183,11 @@ def anchor_name(text: str) -> str:
     return found[1] if found else text
 
 
-def _plain_words(message: str, form: YamlForm) -> str:
-    """Finding of msgspec with the key as it stands in the file."""
+def _plain_words(message: str, form: YamlForm, plain: dict[str, Any]) -> str:
+    """Finding of msgspec with the key as it stands in the file, and the value found there."""
+    found = re.search(r"\$\.(\w+)", message)
+    if found and isinstance(plain.get(found[1]), str):
+        message += f"; is {plain[found[1]]!r}"
     for key, name in form.rename.items():
         message = message.replace(f"$.{name}", f"$.{key}")
     return message.replace("$.", "").replace(" - at ", ", at ")
