@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from axialnav.estimators.baselines.dips import first_null
+from axialnav.estimators.baselines.dips import null_ladder
 from axialnav.estimators.baselines.reading import BlurReading, grey, missing, unusable
+
+MAX_LENGTH_PX = 80  # the authors measured 10 to 50 px; a longer blur's lines drown in the texture's own low frequencies
 
 
 def darkline_length(image: ArrayLike) -> BlurReading:
@@ -18,7 +20,7 @@ def darkline_length(image: ArrayLike) -> BlurReading:
     .. math:: l = W / s.
 
     The power of all rows is collapsed onto the frequency axis (the Radon projection at the known direction) and the
-    first prominent dip taken for the first line. The authors' fuzzy-set detector and fitted constants are replaced by
+    prominent dips taken for the lines. The authors' fuzzy-set detector and fitted constants are replaced by
     this ideal law, because their fit describes their own test pictures.
 
     Known failure: below about 4 px the first line leaves the band, at low contrast the noise floor fills it, and the
@@ -37,10 +39,11 @@ def darkline_length(image: ArrayLike) -> BlurReading:
     reason = unusable(image)
     if reason:
         return missing(reason)
-    dip = first_null(log_power(grey(image)))
-    if dip is None:
+    width = np.shape(image)[1]
+    spacing = null_ladder(log_power(grey(image)), width // MAX_LENGTH_PX)
+    if spacing is None:
         return missing("no dark line stands out of the spectrum's scatter")
-    return BlurReading(np.shape(image)[1] / dip.position, True)
+    return BlurReading(width / spacing, True)
 
 
 def log_power(picture: NDArray[np.float32]) -> NDArray[np.float64]:

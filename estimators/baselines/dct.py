@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.fft import dct
 
-from axialnav.estimators.baselines.dips import first_null
+from axialnav.estimators.baselines.darkline import MAX_LENGTH_PX
+from axialnav.estimators.baselines.dips import prominent_dips
 from axialnav.estimators.baselines.reading import BlurReading, grey, missing, unusable
 
 
@@ -39,7 +40,8 @@ def dct_length(image: ArrayLike) -> BlurReading:
     picture = grey(image)
     window = np.hanning(picture.shape[1]).astype(np.float32)
     power = np.mean(dct(picture * window, axis=1).astype(np.float64) ** 2, axis=0)
-    dip = first_null(np.log(power + 1e-12 * power.max() + np.finfo(float).tiny))
-    if dip is None:
+    width = picture.shape[1]
+    dips = prominent_dips(np.log(power + 1e-12 * power.max() + np.finfo(float).tiny), 2 * width // MAX_LENGTH_PX)
+    if not dips.size:
         return missing("no null stands out of the cosine transform's scatter")
-    return BlurReading(2.0 * picture.shape[1] / dip.position, True)
+    return BlurReading(2.0 * width / float(dips[0]), True)
