@@ -21,7 +21,7 @@ def nees_verdict(metrics: dict[str, Any]) -> str:
 
 def findings(metrics: dict[str, Any]) -> list[str]:
     """What stands out, the gravest first: coverage, consistency, conditions, silent or refused sensors, whiteness."""
-    return [*_coverage(metrics), *_consistency(metrics), *_condition(metrics), *_sensors(metrics)]
+    return [*_coverage(metrics), *_consistency(metrics), *_condition(metrics), *_sensors(metrics), *_whiteness(metrics)]
 
 
 def _coverage(metrics: dict[str, Any]) -> Iterator[str]:
@@ -72,9 +72,17 @@ def _sensor(sensor: dict[str, Any]) -> Iterator[str]:
     compared = sensor["fused"] + sensor["gated"]
     if sensor["gated"] > MANY_GATED * compared:
         yield f"{100.0 * sensor['gated'] / compared:.0f} % of the readings were gated."
-    limit = max(2.0 / math.sqrt(max(sensor["fused"], 1)), NOTABLE_LAG1)
-    if sensor["lag1"] is not None and abs(sensor["lag1"]) > limit:
+
+
+def _whiteness(metrics: dict[str, Any]) -> Iterator[str]:
+    coloured = [f"{name} {s['lag1']:+.2f}" for name, s in metrics["sensors"].items() if _is_coloured(s)]
+    if coloured:
         yield (
-            f"innovations are not white (lag-1 {sensor['lag1']:+.2f}, limit {limit:.2f}): errors that last longer than "
-            f"one reading, or process noise told wrong."
+            f"Innovations are not white (lag-1 {', '.join(coloured)}): errors that last longer than one "
+            f"reading, or noise told wrong."
         )
+
+
+def _is_coloured(sensor: dict[str, Any]) -> bool:
+    limit = max(2.0 / math.sqrt(max(sensor["fused"], 1)), NOTABLE_LAG1)
+    return sensor["lag1"] is not None and abs(sensor["lag1"]) > limit

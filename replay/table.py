@@ -97,7 +97,8 @@ def _scores(run: Run) -> Iterator[str]:
         late = _number(metrics["gps_latency_s"], ".2f")
         yield f"horizontal speed vs GPS   RMS {speed} m/s   GPS late by about {late} s (scored as stamped)   {coverage}"
     if metrics["position_rmse_m"] is None:
-        yield f"axial velocity vs reference   {NOT_EVALUATED} ({WHY_NOT[kind]})   {coverage}"
+        scored = "" if kind == "gps" else f"   {coverage}"
+        yield f"axial velocity vs reference   {NOT_EVALUATED} ({WHY_NOT[kind]}){scored}"
         return
     yield from _truth_scores(metrics, coverage)
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 MAX_POINTS = 2000
+GOLDEN_RATIO = 0.6180339887498949
 
 
 def minmax_rows(values: Array, max_points: int = MAX_POINTS) -> NDArray[np.int64]:
@@ -25,6 +26,22 @@ def minmax_rows(values: Array, max_points: int = MAX_POINTS) -> NDArray[np.int64
     ascending = np.lexsort((rows, np.where(np.isnan(values), np.inf, values), of_bin))
     descending = np.lexsort((rows, np.where(np.isnan(values), np.inf, -values), of_bin))
     return np.unique(np.concatenate(([0, count - 1], ascending[starts], descending[starts])))
+
+
+def scatter_rows(values: Array, max_points: int = MAX_POINTS) -> NDArray[np.int64]:
+    """Rows of a cloud of points to draw: three quarters spread evenly, so that its density is true, the rest extremes.
+
+    The even part takes one row from each of equal stretches, at a place that shifts by the golden ratio from stretch to
+    stretch, so that it cannot fall into step with readings that come in turns (one UWB anchor after the other).
+
+    values : (n,).  Returns ascending rows, all of them where n fits.
+    """
+    if values.size <= max_points:
+        return np.arange(values.size)
+    even = 3 * max_points // 4
+    stretch = np.arange(even)
+    place = (stretch + np.modf(stretch * GOLDEN_RATIO)[0]) * (values.size / even)
+    return np.unique(np.concatenate((place.astype(np.int64), minmax_rows(values, max_points - even))))
 
 
 def gap_starts(seconds: Array) -> NDArray[np.int64]:

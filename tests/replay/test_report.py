@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from axialnav.replay.report.decimate import envelope, line_points, minmax_rows
+from axialnav.replay.report.decimate import envelope, line_points, minmax_rows, scatter_rows
 from axialnav.replay.report.page import render_report
 from tests.replay.made_runs import make_run
 
@@ -117,6 +117,22 @@ def test_decimation_keeps_every_extreme() -> None:
     for chunk in np.array_split(np.arange(values.size), 500):
         kept = values[rows[(rows >= chunk[0]) & (rows <= chunk[-1])]]
         assert kept.size >= 2
+
+
+def test_a_thinned_cloud_keeps_its_density_and_its_extremes() -> None:
+    values = np.random.default_rng(1).normal(size=50_000)
+    values[777] = 40.0
+    rows = scatter_rows(values, 2000)
+    assert rows.size <= 2000
+    assert 777 in rows
+    assert np.median(np.abs(values[rows])) < 1.15  # 0.67 for the whole cloud, 3.3 for its extremes alone
+    assert scatter_rows(values[:100], 2000).tolist() == list(range(100))
+
+
+def test_readings_that_come_in_turns_are_all_drawn() -> None:
+    anchor = np.arange(40_000) % 8
+    rows = scatter_rows(np.zeros(anchor.size), 2000)
+    assert np.bincount(anchor[rows], minlength=8).min() > 120
 
 
 def test_a_line_breaks_at_gaps_and_nowhere_else() -> None:

@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.outcome import InnovationLog, Verdict
-from axialnav.replay.report.decimate import minmax_rows
-from axialnav.replay.report.figure import BLUE, GREY, ORANGE, PURPLE, Figure, points
+from axialnav.replay.report.decimate import scatter_rows
+from axialnav.replay.report.figure import AXIS_COLOURS, GREY, ORANGE, PURPLE, Figure, points
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
 
 Array = NDArray[np.float64]
-DRAWN = ((Verdict.FUSED, BLUE, "circle"), (Verdict.GATED, ORANGE, "x"), (Verdict.SUSPECT, PURPLE, "diamond"))
+FUSED_COLOURS = (AXIS_COLOURS[0], AXIS_COLOURS[2], PURPLE)
+DRAWN = (
+    (Verdict.FUSED, FUSED_COLOURS, "circle"),
+    (Verdict.GATED, (ORANGE,) * 3, "x"),
+    (Verdict.SUSPECT, (PURPLE,) * 3, "diamond"),
+)
 MAX_PER_TRACE = 2000
 
 
@@ -23,7 +28,8 @@ def build(run: Run) -> Section | None:
     figures = [figure for index in range(len(run.log.sensors)) if (figure := _figure(run, index))]
     note = (
         "Innovation (reading minus prediction) divided by its predicted sigma. Honest noise: 95 % within 2, no pattern "
-        "in time. Points beyond the drawn range sit on its edge; the pointer shows their value."
+        "in time. Points beyond the drawn range sit on its edge; the pointer shows their value. "
+        "Long recordings are thinned; extremes stay."
     )
     return Section("Innovations", figures, note=note) if figures else None
 
@@ -47,9 +53,14 @@ def _figure(run: Run, index: int) -> Figure | None:
 
 
 def _axis(
-    log: InnovationLog, seconds: Array, rows: NDArray[np.int64], axis: int, edge: float, style: tuple[Verdict, str, str]
+    log: InnovationLog,
+    seconds: Array,
+    rows: NDArray[np.int64],
+    axis: int,
+    edge: float,
+    style: tuple[Verdict, tuple[str, ...], str],
 ) -> list[dict[str, Any]]:
-    verdict, colour, symbol = style
+    verdict, colours, symbol = style
     name = verdict.name.lower()
     with np.errstate(invalid="ignore", divide="ignore"):
         value = log.innovation[rows, axis] / np.sqrt(log.variance[rows, axis])
@@ -57,9 +68,11 @@ def _axis(
     rows, value = rows[finite], value[finite]
     if value.size == 0:
         return []
-    kept = minmax_rows(value, MAX_PER_TRACE)
+    kept = scatter_rows(value, MAX_PER_TRACE)
     label = name if int(log.dof[rows].max()) == 1 else f"{name} {'xyz'[axis]}"
-    trace = points(seconds[rows[kept]], np.clip(value[kept], -edge, edge), label, colour, symbol=symbol, opacity=0.6)
+    trace = points(
+        seconds[rows[kept]], np.clip(value[kept], -edge, edge), label, colours[axis], symbol=symbol, opacity=0.6
+    )
     trace["marker"]["size"] = 3 if name == "fused" else 5
     trace["text"] = [f"{v:.2f}" for v in value[kept]]
     trace["hovertemplate"] = "%{x:.2f} s: %{text} sigma<extra>" + label + "</extra>"
