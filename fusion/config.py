@@ -71,15 +71,57 @@ class ImuTuning(_Table, frozen=True, kw_only=True):
 
     accel_noise_scale: Positive = 1.0
     gyro_noise_scale: Positive = 1.0
-    initial_gyro_bias_rad_s: Positive = 0.01
-    initial_accel_bias_m_s2: Positive = 0.3
+
+
+class StartTuning(_Table, frozen=True, kw_only=True):
+    """How the first state is found and how far it is trusted.
+
+    Roll, pitch and the gyro bias come from the first ``window_s``; while the vehicle stands still (rates and specific
+    force vary by less than ``still_gyro_rad_s`` and ``still_accel_m_s2``) the mean rate is the bias.
+    """
+
+    window_s: Positive = 1.0
+    still_gyro_rad_s: Positive = 0.03
+    still_accel_m_s2: Positive = 0.15
+    sigma_tilt_still_rad: Positive = 0.03
+    sigma_tilt_moving_rad: Positive = 0.08
+    sigma_gyro_bias_rad_s: Positive = 0.01
+    sigma_accel_bias_m_s2: Positive = 0.3
+    sigma_position_m: Positive = 0.5
+    sigma_velocity_m_s: Positive = 0.1
+    sigma_yaw_unknown_rad: Positive = 1.8
+
+
+class ImuFault(_Table, frozen=True, kw_only=True):
+    """When the accelerometer stops being believed, and how it is treated then.
+
+    The aids' corrections of velocity are watched.  Where they ask for more than ``doubt_m_s2`` on average over
+    ``doubt_time_s``, a rival filter with ``noise_scale`` times the accelerometer noise and the bias walk ``bias_walk``
+    [m s^-3 Hz^-1/2] runs beside for ``trial_s`` on the same readings.  It takes over when the readings are
+    exp(``evidence``) times as likely under it; it hands back after ``trials_to_clear`` trials in a row in which the
+    healthy filter explains them no worse.
+    """
+
+    enabled: bool = True
+    noise_scale: Positive = 10.0
+    bias_walk: Positive = 1.0
+    doubt_m_s2: Positive = 0.4
+    doubt_time_s: Positive = 0.5
+    trial_s: Positive = 2.0
+    evidence: Positive = 15.0
+    trials_to_clear: Annotated[int, msgspec.Meta(ge=1)] = 5
 
 
 class UwbTuning(_Table, frozen=True, kw_only=True):
-    """Noise of UWB readings; ``sigma_m`` is honest for errors that are correlated in time."""
+    """Noise of UWB readings.
 
-    sigma_m: Positive = 0.5
-    bias_sigma_m: Positive = 0.1
+    Errors of neighbouring readings are alike over ``correlation_time_s``; a reading that comes every dt is given the
+    variance ``sigma_m^2 (1 + 2 correlation_time_s / dt)``, so that fast receivers are not believed too much.
+    """
+
+    sigma_m: Positive = 0.15
+    correlation_time_s: NonNegative = 0.015
+    bias_sigma_m: Positive = 0.002
     bias_time_s: Positive = 10.0
     gate: Gate = Gate()
 
@@ -121,6 +163,10 @@ class SupervisorTuning(_Table, frozen=True, kw_only=True):
     """When a source is held suspect, re-anchored or reported silent."""
 
     timeout_s: Positive = 1.0
+    dead_reckoning_s: Positive = 1.0
+    invalid_s: Positive = 5.0
+    reanchor_aided_s: Positive = 15.0
+    reanchor_alone_s: Positive = 2.0
 
 
 class Config(_Table, frozen=True, kw_only=True):
@@ -129,7 +175,9 @@ class Config(_Table, frozen=True, kw_only=True):
     gravity_m_s2: Annotated[float, msgspec.Meta(gt=0.0, le=30.0)] = 9.80665
     corridor: Corridor | None = None
     initial: Initial | None = None
+    start: StartTuning = StartTuning()
     imu: ImuTuning = ImuTuning()
+    imu_fault: ImuFault = ImuFault()
     uwb: UwbTuning = UwbTuning()
     flow: FlowTuning = FlowTuning()
     range: RangeTuning = RangeTuning()
@@ -139,6 +187,11 @@ class Config(_Table, frozen=True, kw_only=True):
     disabled: tuple[str, ...] = ()
     surface: dict[str, Surface] = {}
     sensor: dict[str, AnySensor] = {}
+
+    @property
+    def axis(self) -> Vector3:
+        """Unit vector along which "axial" is meant, corridor frame."""
+        return (self.corridor or Corridor()).axis
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], *, where: str = "configuration") -> Config:

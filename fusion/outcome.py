@@ -182,3 +182,18 @@ class InnovationLog:
     nis: Array
     gate: Array
     weight: Array
+
+
+def verdict_of(reason: Reason) -> Verdict:
+    """Verdict that goes with a reason."""
+    if reason is Reason.NONE:
+        return Verdict.FUSED
+    if reason is Reason.INNOVATION:
+        return Verdict.GATED
+    if reason is Reason.TOO_OLD:
+        return Verdict.LATE
+    if reason in {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT}:
+        return Verdict.BLIND
+    if reason is Reason.SUPERVISOR:
+        return Verdict.SUSPECT
+    return Verdict.INVALID

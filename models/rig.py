@@ -143,4 +143,6 @@ class Surface(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     def __post_init__(self) -> None:
         length = math.sqrt(sum(c * c for c in self.normal))
         if not abs(length - 1.0) < 1e-3:
-            raise ValueError(f"surface normal must have length 1 (tolerance 0.001), got {length:.4g} from {self.normal}")
+            raise ValueError(
+                f"surface normal must have length 1 (tolerance 0.001), got {length:.4g} from {self.normal}"
+            )

@@ -1,0 +1,95 @@
+"""Readings as rows of numbers: the one packing that the streaming door and the replay kernel share.
+
+An event is (t_ns, source, values[8]).  Columns by kind:
+
+=============  =====================================================================
+IMU            gyro x y z [rad/s], accel x y z [m/s^2]
+FLOW           window [s], dx, dy [px], sigma [px], quality
+BLUR           window [s], length [px], sigma [px]
+RANGE          range, sigma [m]
+UWB_RANGE      anchor, range, sigma [m], rssi, first path [dBm]
+UWB_TDOA       anchor a, anchor b, difference, sigma [m]
+UWB_POSITION   x, y, z, sigma x, sigma y, sigma z [m]
+HEIGHT         height, sigma [m]
+ATTITUDE       roll, pitch, yaw, sigma [rad]
+=============  =====================================================================
+
+NaN stands for "not given".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.sources import Kind, fused_sensors, kind_of
+
+WIDTH = 8
+COLUMNS: dict[Kind, tuple[str, ...]] = {
+    Kind.IMU: ("gyro_rad_s", "accel_m_s2"),
+    Kind.FLOW: ("window_s", "dx_px", "dy_px", "sigma_px", "quality"),
+    Kind.BLUR: ("window_s", "length_px", "sigma_px"),
+    Kind.RANGE: ("range_m", "sigma_m"),
+    Kind.UWB_RANGE: ("anchor", "range_m", "sigma_m", "rssi_dbm", "first_path_dbm"),
+    Kind.UWB_TDOA: ("anchor_a", "anchor_b", "difference_m", "sigma_m"),
+    Kind.UWB_POSITION: ("position_m", "sigma_m"),
+    Kind.HEIGHT: ("height_m", "sigma_m"),
+    Kind.ATTITUDE: ("roll_rad", "pitch_rad", "yaw_rad", "sigma_rad"),
+}
+
+
+class Table(Protocol):
+    """Readings of one sensor as columns, keyed by the fields of its reading class."""
+
+    @property
+    def t_ns(self) -> NDArray[np.int64]:
+        """Stamps [ns], shape (n,)."""
+
+    @property
+    def columns(self) -> Mapping[str, NDArray[np.generic]]:
+        """Values, each (n,) or (n, 3); NaN or absent means not given."""
+
+
+class Events(NamedTuple):
+    """A sorted batch: stamps (n,), source indices (n,), values (n, 8)."""
+
+    t_ns: NDArray[np.int64]
+    source: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+
+def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
+    """Merge the tables of all fused sensors into one batch, sorted by stamp, then by the fixed order of sources."""
+    stamps, sources, values = [], [], []
+    for index, name in enumerate(fused_sensors(config)):
+        if name not in tables:
+            continue
+        table = tables[name]
+        kind = kind_of(config.sensor[name])
+        assert kind is not None
+        stamps.append(np.asarray(table.t_ns, dtype=np.int64))
+        sources.append(np.full(len(table.t_ns), index, dtype=np.int64))
+        values.append(_pack_columns(table, COLUMNS[kind]))
+    if not stamps:
+        return Events(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WIDTH)))
+    t_ns, source, value = np.concatenate(stamps), np.concatenate(sources), np.concatenate(values)
+    order = np.lexsort((source, t_ns))
+    return Events(t_ns[order], source[order], np.ascontiguousarray(value[order]))
+
+
+def _pack_columns(table: Table, names: tuple[str, ...]) -> NDArray[np.float64]:
+    packed = np.full((len(table.t_ns), WIDTH), np.nan)
+    at = 0
+    for name in names:
+        width = 3 if name in {"gyro_rad_s", "accel_m_s2", "position_m"} else 1
+        if name in table.columns:
+            column = np.asarray(table.columns[name], dtype=np.float64)
+            if name == "sigma_m" and column.ndim == 2:
+                width = 3
+            packed[:, at : at + width] = column.reshape(len(column), width)
+        at += width
+    return packed

@@ -1,0 +1,109 @@
+r"""Covariance of the error state: prediction by blocks and the scalar update.
+
+The transition has a 9x9 core (position, velocity, attitude) that is fed by two bias blocks; everything else is a
+walk.  Row and column passes over that structure need 0.9 k multiply-adds instead of the 11.7 k of the dense product.
+The dense textbook forms live in the tests as oracle.
+
+Source: Sola (2017), eq. 268-270; Bar-Shalom (2001), eq. 5.2.3-18 (Joseph form).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.models.jit import kernel
+from axialnav.models.rotations import rotate_in_body
+from axialnav.models.state import E_UWB_BIAS, QUAT
+
+Array = NDArray[np.float64]
+N = 18
+CORE = 9
+
+
+@kernel
+def predict_covariance(P: Array, F: Array, dt: float, uwb_decay: float, Q: Array) -> None:
+    """Replace ``P`` (18, 18) by ``Phi P Phi' + diag(Q)`` in place.
+
+    ``F`` (9, 3) holds the blocks written by :func:`axialnav.models.imu.strapdown`, ``uwb_decay`` the Gauss-Markov
+    factor of the UWB bias over the step, ``Q`` (18,) the discrete noise.
+    """
+    for j in range(N):
+        for i in range(3):
+            P[i, j] += dt * P[3 + i, j]
+    for i in range(3):
+        f0, f1, f2 = F[i, 0], F[i, 1], F[i, 2]
+        b0, b1, b2 = F[3 + i, 0], F[3 + i, 1], F[3 + i, 2]
+        for j in range(N):
+            P[3 + i, j] += f0 * P[6, j] + f1 * P[7, j] + f2 * P[8, j] - b0 * P[12, j] - b1 * P[13, j] - b2 * P[14, j]
+    for j in range(N):
+        t0, t1, t2 = P[6, j], P[7, j], P[8, j]
+        P[6, j] = F[6, 0] * t0 + F[6, 1] * t1 + F[6, 2] * t2 - dt * P[9, j]
+        P[7, j] = F[7, 0] * t0 + F[7, 1] * t1 + F[7, 2] * t2 - dt * P[10, j]
+        P[8, j] = F[8, 0] * t0 + F[8, 1] * t1 + F[8, 2] * t2 - dt * P[11, j]
+    for i in range(CORE):
+        _predict_row(P[i], F, dt)
+    for i in range(CORE):
+        P[i, E_UWB_BIAS] *= uwb_decay
+        for j in range(CORE, N):
+            P[j, i] = P[i, j]
+        for j in range(i + 1, CORE):
+            P[j, i] = P[i, j]
+    for i in range(CORE, N):
+        P[i, E_UWB_BIAS] *= uwb_decay
+    for i in range(CORE, N):
+        P[E_UWB_BIAS, i] *= uwb_decay
+    for i in range(N):
+        P[i, i] += Q[i]
+
+
+@kernel
+def _predict_row(row: Array, F: Array, dt: float) -> None:
+    """Apply the column pass of ``Phi'`` to one row of the core."""
+    t0, t1, t2 = row[6], row[7], row[8]
+    a0, a1, a2 = row[12], row[13], row[14]
+    for i in range(3):
+        row[i] += dt * row[3 + i]
+        row[3 + i] += (
+            F[i, 0] * t0 + F[i, 1] * t1 + F[i, 2] * t2 - F[3 + i, 0] * a0 - F[3 + i, 1] * a1 - F[3 + i, 2] * a2
+        )
+        row[6 + i] = F[6 + i, 0] * t0 + F[6 + i, 1] * t1 + F[6 + i, 2] * t2 - dt * row[9 + i]
+
+
+@kernel
+def project(P: Array, H: Array, PHt: Array) -> float:
+    """Write ``P H'`` into ``PHt`` (18,) and return ``H P H'``; zeros of the row ``H`` (18,) cost nothing."""
+    for j in range(N):
+        PHt[j] = 0.0
+    for k in range(N):
+        h = H[k]
+        if h != 0.0:
+            for j in range(N):
+                PHt[j] += h * P[k, j]
+    variance = 0.0
+    for k in range(N):
+        variance += H[k] * PHt[k]
+    return variance
+
+
+@kernel
+def correct(x: Array, P: Array, PHt: Array, S: float, innovation: float, gain: Array) -> None:
+    """Scalar Joseph update of nominal state ``x`` (19,) and covariance ``P`` in place; ``gain`` (18,) is scratch."""
+    for i in range(N):
+        gain[i] = PHt[i] / S
+    for i in range(N):
+        a = -gain[i]
+        b = S * gain[i] - PHt[i]
+        for j in range(N):
+            P[i, j] += a * PHt[j] + b * gain[j]
+    inject(x, gain, innovation)
+
+
+@kernel
+def inject(x: Array, gain: Array, innovation: float) -> None:
+    """Add the error state ``gain * innovation`` to the nominal state (attitude multiplicatively, body axes)."""
+    for i in range(6):
+        x[i] += gain[i] * innovation
+    rotate_in_body(x[QUAT : QUAT + 4], gain[6] * innovation, gain[7] * innovation, gain[8] * innovation)
+    for i in range(9, N):
+        x[i + 1] += gain[i] * innovation

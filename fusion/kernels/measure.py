@@ -1,0 +1,159 @@
+"""From an event to what the update needs: readings, predictions, Jacobian rows and variances per axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.outcome import Reason
+from axialnav.fusion.sources import Kind
+from axialnav.models.aiding import height, tilt
+from axialnav.models.jit import Record, kernel
+from axialnav.models.pixel_motion import pixel_motion
+from axialnav.models.state import E_VEL, N_ERROR, WALL_OFFSET
+from axialnav.models.uwb import uwb_position, uwb_range, uwb_tdoa
+from axialnav.models.wall_range import wall_range
+
+Array = NDArray[np.float64]
+
+FLOW, BLUR, RANGE = int(Kind.FLOW), int(Kind.BLUR), int(Kind.RANGE)
+UWB_RANGE, UWB_TDOA, UWB_POSITION = int(Kind.UWB_RANGE), int(Kind.UWB_TDOA), int(Kind.UWB_POSITION)
+HEIGHT = int(Kind.HEIGHT)
+WEAK_SIGNAL, NO_GEOMETRY, OUT_OF_RANGE = int(Reason.WEAK_SIGNAL), int(Reason.NO_GEOMETRY), int(Reason.OUT_OF_RANGE)
+UNKNOWN_ANCHOR, SIGN_UNCERTAIN, TOO_SHORT = (
+    int(Reason.UNKNOWN_ANCHOR),
+    int(Reason.SIGN_UNCERTAIN),
+    int(Reason.TOO_SHORT),
+)
+SIGN_SIGMAS = 2.0
+
+
+@kernel
+def measure(s: Record, seen: Record, values: Array, x: Array, P: Array, m: Record, w: Record, c: Record) -> int:
+    """Evaluate one event; return its number of axes, or minus the :class:`Reason` why it cannot be used.
+
+    ``w.z``, ``w.h``, ``w.variance`` receive reading, prediction and noise variance per axis, ``w.H`` the Jacobian rows.
+    ``w.p`` and ``w.R`` hold the position at the stamp and the attitude.
+    """
+    w.H[:] = 0.0
+    kind = s.kind
+    if kind == UWB_TDOA or kind == UWB_RANGE:
+        return _measure_uwb(s, kind, values, x, w)
+    if kind == FLOW:
+        return _measure_flow(s, values, x, m, w)
+    if kind == BLUR:
+        return _measure_blur(s, values, x, P, m, w)
+    if kind == RANGE:
+        return _measure_range(s, values, x, w)
+    if kind == UWB_POSITION:
+        return _measure_fix(s, values, x, w, c)
+    if kind == HEIGHT:
+        w.z[0] = values[0]
+        w.h[0] = height(w.p, seen.datum_m, w.H[0])
+        w.variance[0] = variance_of(values[1], s.sigma)
+        return 1
+    for i in range(2):
+        w.z[i] = values[i]
+        w.h[i] = tilt(w.R, i, w.H[i])
+        w.variance[i] = variance_of(values[3], s.sigma)
+    return 2
+
+
+@kernel
+def variance_of(claimed_sigma: float, floor_sigma: float) -> float:
+    """Noise variance: the reading's own claim where it makes one, but never below the configured floor."""
+    sigma = claimed_sigma if claimed_sigma > floor_sigma else floor_sigma
+    return sigma * sigma
+
+
+@kernel
+def _surface_offset(s: Record, x: Array) -> float:
+    return x[WALL_OFFSET] if s.offset_is_state else s.offset_m
+
+
+@kernel
+def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
+    w.z[0] = values[0]
+    if not s.low <= values[0] <= s.high:
+        return -OUT_OF_RANGE
+    w.h[0] = wall_range(
+        w.p, w.R, s.R_BS, s.lever_B, s.normal_W, _surface_offset(s, x), s.offset_is_state, w.H[0], w.ray
+    )
+    w.variance[0] = variance_of(values[1], s.sigma)
+    return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
+
+
+@kernel
+def _measure_uwb(s: Record, kind: int, values: Array, x: Array, w: Record) -> int:
+    a = int(values[0])
+    if not 0 <= a < s.n_anchors:
+        return -UNKNOWN_ANCHOR
+    if kind == UWB_RANGE:
+        w.z[0] = values[1]
+        if not values[1] > 0.0:
+            return -OUT_OF_RANGE
+        w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], w.H[0])
+        w.variance[0] = variance_of(values[2], s.sigma)
+    else:
+        b = int(values[1])
+        if not 0 <= b < s.n_anchors:
+            return -UNKNOWN_ANCHOR
+        w.z[0] = values[2]
+        w.h[0] = uwb_tdoa(x, w.p, w.R, s.lever_B, s.anchors[a], s.anchors[b], w.H[0])
+        w.variance[0] = variance_of(values[3], s.sigma)
+    return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
+
+
+@kernel
+def _measure_fix(s: Record, values: Array, x: Array, w: Record, c: Record) -> int:
+    for i in range(3):
+        axial = c.axial_x if i == 0 else (c.axial_y if i == 1 else c.axial_z)
+        w.z[i] = values[i]
+        w.h[i] = uwb_position(x, w.p, w.R, s.lever_B, axial, i, w.H[i])
+        w.variance[i] = variance_of(values[3 + i], s.sigma)
+    return 3
+
+
+@kernel
+def _pixel_motion(s: Record, window_s: float, axis: int, x: Array, m: Record, w: Record) -> float:
+    for i in range(2):
+        w.focal_window[i] = s.focal_px[i] * window_s
+    return pixel_motion(
+        x, w.p, w.R, m.imu[0:3], s.R_BS, s.lever_B, s.normal_W, _surface_offset(s, x), s.offset_is_state,
+        w.focal_window, axis, w.H[axis], w.ray,
+    )  # fmt: skip
+
+
+@kernel
+def _measure_flow(s: Record, values: Array, x: Array, m: Record, w: Record) -> int:
+    if values[4] < s.low:
+        return -WEAK_SIGNAL
+    axes = 2 if np.isfinite(values[2]) else 1
+    for i in range(axes):
+        w.z[i] = values[1 + i]
+        w.h[i] = _pixel_motion(s, values[0], i, x, m, w)
+        w.variance[i] = values[3] ** 2 if np.isfinite(values[3]) else s.sigma**2
+    return axes if np.isfinite(w.h[0]) else -NO_GEOMETRY
+
+
+@kernel
+def _measure_blur(s: Record, values: Array, x: Array, P: Array, m: Record, w: Record) -> int:
+    """Unsigned length: usable only while the direction of motion is known and the blur is long enough to see."""
+    signed = _pixel_motion(s, values[0], 0, x, m, w)
+    if not np.isfinite(signed):
+        return -NO_GEOMETRY
+    spread = 0.0
+    for i in range(3):
+        for j in range(3):
+            spread += w.H[0, E_VEL + i] * P[E_VEL + i, E_VEL + j] * w.H[0, E_VEL + j]
+    if signed * signed < SIGN_SIGMAS * SIGN_SIGMAS * spread:
+        return -SIGN_UNCERTAIN
+    w.z[0] = values[1]
+    w.variance[0] = values[2] ** 2 if np.isfinite(values[2]) else s.sigma**2
+    if values[1] * values[1] < SIGN_SIGMAS * SIGN_SIGMAS * w.variance[0]:
+        return -TOO_SHORT
+    w.h[0] = abs(signed)
+    if signed < 0.0:
+        for k in range(N_ERROR):
+            w.H[0, k] = -w.H[0, k]
+    return 1

@@ -1,0 +1,69 @@
+"""One inertial sample: both filters forward, and whether the accelerometer is in doubt."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.kernels.covariance import predict_covariance
+from axialnav.models.imu import strapdown
+from axialnav.models.jit import Record, kernel
+from axialnav.models.state import E_ACCEL_BIAS, E_ATT, E_BLUR_SCALE, E_GYRO_BIAS, E_UWB_BIAS, E_VEL, E_WALL_OFFSET
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def rotate_sample(values: Array, R_BS: Array, out: Array) -> None:
+    """Write rate and specific force of a sample, turned into body axes, into ``out`` (6,)."""
+    for i in range(3):
+        out[i] = R_BS[i, 0] * values[0] + R_BS[i, 1] * values[1] + R_BS[i, 2] * values[2]
+        out[3 + i] = R_BS[i, 0] * values[3] + R_BS[i, 1] * values[4] + R_BS[i, 2] * values[5]
+
+
+@kernel
+def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: Record) -> None:
+    """Predict filter ``row`` over ``dt`` with the mean sample in ``w.mean_imu``; ``fault`` selects the noise."""
+    strapdown(m.x[row], w.mean_imu[0:3], w.mean_imu[3:6], dt, c.gravity_m_s2, w.R, w.F)
+    accel = c.fault_accel_variance if fault else c.accel_variance
+    accel_walk = c.fault_accel_walk if fault else c.accel_walk
+    for i in range(3):
+        w.Q[E_VEL + i] = accel * dt
+        w.Q[E_ATT + i] = c.gyro_variance * dt
+        w.Q[E_GYRO_BIAS + i] = c.gyro_walk * dt
+        w.Q[E_ACCEL_BIAS + i] = accel_walk * dt
+    decay = math.exp(-dt / c.uwb_bias_time_s)
+    w.Q[E_BLUR_SCALE] = c.blur_scale_walk * dt
+    w.Q[E_UWB_BIAS] = c.uwb_bias_variance * (1.0 - decay * decay)
+    w.Q[E_WALL_OFFSET] = c.wall_offset_walk * dt
+    m.x[row, E_UWB_BIAS + 1] *= decay
+    predict_covariance(m.P[row], w.F, dt, decay, w.Q)
+
+
+@kernel
+def propagate(t_ns: int, values: Array, R_BS: Array, m: Record, w: Record, c: Record) -> float:
+    """Advance to the inertial sample at ``t_ns``; return the step [s], 0 for the first or a repeated sample.
+
+    Rate and specific force over the step are the mean of the samples at its two ends.
+    """
+    dt = (t_ns - m.t_imu) * 1e-9
+    if m.started == 0:
+        rotate_sample(values, R_BS, m.imu)
+        m.started = 1
+        m.t_imu = t_ns
+        return 0.0
+    if dt <= 0.0:
+        return 0.0
+    for i in range(6):
+        w.mean_imu[i] = m.imu[i]
+    rotate_sample(values, R_BS, m.imu)
+    for i in range(6):
+        w.mean_imu[i] = 0.5 * (w.mean_imu[i] + m.imu[i])
+    fault = m.imu_fault == 1
+    propagate_filter(0, fault, dt, m, w, c)
+    if m.on_trial == 1:
+        propagate_filter(1, not fault, dt, m, w, c)
+    m.t_imu = t_ns
+    return dt

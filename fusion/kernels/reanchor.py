@@ -1,0 +1,96 @@
+"""Recovery from lock-out: when a UWB source is refused for long though it moves as we do, move the position to it.
+
+Only the position is moved, its covariance opened and its correlations cut; velocity and tilt are never reset by UWB.
+The offset comes from a fading least-squares fit of position to the refused readings, so any mix of ranges, range
+differences and fixes serves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.models.jit import Record, kernel
+from axialnav.models.state import E_POS, N_ERROR, POS
+
+Array = NDArray[np.float64]
+FIT_TIME_S = 1.0
+TRUST_TIME_S = 0.5
+TRUSTED = 0.2  # mean weight below which a source counts as refused
+EXPLAINED = 0.8  # share of the squared innovations that one offset must explain
+FLOW_FRESH_S = 1.0
+MAX_CONDITION = 1e6
+MAX_INNOVATION_M = 1e3
+
+
+@kernel
+def observe_source(t_ns: int, gap_s: float, axes: int, weight: float, seen: Record, w: Record) -> None:
+    """Add one reading of a source to its fading fit and its mean weight."""
+    step = min(max(gap_s, 0.0), 1.0)
+    fade = math.exp(-step / FIT_TIME_S)
+    blend = min(step / TRUST_TIME_S, 1.0)
+    seen.trust += blend * (weight - seen.trust)
+    if seen.trust > TRUSTED:
+        seen.t_trusted = t_ns
+    _fade_fit(fade, seen)
+    for i in range(axes):
+        y = w.z[i] - w.h[i]
+        if abs(y) > MAX_INNOVATION_M:
+            continue
+        seen.fit_energy += y * y
+        for a in range(3):
+            seen.fit_rhs[a] += w.H[i, E_POS + a] * y
+            for b in range(3):
+                seen.fit[a, b] += w.H[i, E_POS + a] * w.H[i, E_POS + b]
+
+
+@kernel
+def _fade_fit(fade: float, seen: Record) -> None:
+    seen.fit_energy *= fade
+    for a in range(3):
+        seen.fit_rhs[a] *= fade
+        for b in range(3):
+            seen.fit[a, b] *= fade
+
+
+@kernel
+def reanchor(t_ns: int, seen: Record, m: Record, c: Record) -> bool:
+    """Move the position to a source that has been refused too long, if one offset explains its readings."""
+    aided = (t_ns - m.t_flow) * 1e-9 < FLOW_FRESH_S
+    patience_s = c.reanchor_aided_s if aided else c.reanchor_alone_s
+    if (t_ns - seen.t_trusted) * 1e-9 < patience_s:
+        return False
+    normal = seen.fit.copy()
+    spread = np.linalg.eigvalsh(normal)
+    if not spread[0] * MAX_CONDITION > spread[2] > 0.0:
+        return False
+    offset = np.linalg.solve(normal, seen.fit_rhs.copy())
+    explained = 0.0
+    for a in range(3):
+        explained += seen.fit_rhs[a] * offset[a]
+    if explained < EXPLAINED * seen.fit_energy:
+        return False
+    for row in range(2):
+        _move(offset, m.x[row], m.P[row])
+    for a in range(3):
+        m.last_reset_m[a] = offset[a]
+    m.resets += 1
+    seen.t_trusted = t_ns
+    seen.trust = 1.0
+    _fade_fit(0.0, seen)
+    return True
+
+
+@kernel
+def _move(offset: Array, x: Array, P: Array) -> None:
+    """Shift the position and forget what it was correlated with; variance at least a quarter of the jump squared."""
+    for a in range(3):
+        x[POS + a] += offset[a]
+        i = E_POS + a
+        variance = max(P[i, i], 0.25 * offset[a] * offset[a])
+        for k in range(N_ERROR):
+            P[i, k] = 0.0
+            P[k, i] = 0.0
+        P[i, i] = variance

@@ -1,0 +1,70 @@
+"""Is the accelerometer to be believed?  A rival filter with the other answer is asked on the same readings.
+
+Healthy and faulty differ in the noise given to the accelerometer.  The rival starts as a copy of the estimate and sees
+the same readings; the difference of log-likelihoods, counted once per independent reading, decides (a sequential
+probability ratio test).  Running it only in doubt costs nothing on a healthy flight.
+
+Source: Bar-Shalom, Li, Kirubarajan (2001), section 11.6.2 (static multiple models); Wald (1945).
+"""
+
+from __future__ import annotations
+
+import math
+
+from axialnav.models.jit import Record, kernel
+
+
+@kernel
+def in_doubt(dt: float, m: Record, c: Record) -> bool:
+    """Update the mean velocity correction [m/s^2] that the aids ask for; whether it is more than a bias could be."""
+    decay = math.exp(-dt / c.doubt_time_s)
+    size2 = 0.0
+    for i in range(3):
+        rate = m.correction_rate[i] * decay + m.correction[i] / c.doubt_time_s
+        m.correction_rate[i] = rate
+        m.correction[i] = 0.0
+        size2 += rate * rate
+    return size2 > c.doubt_m_s2 * c.doubt_m_s2
+
+
+@kernel
+def supervise_imu(dt: float, m: Record, c: Record) -> None:
+    """Start, judge and end trials of the rival after an inertial step."""
+    doubtful = in_doubt(dt, m, c)
+    fault = m.imu_fault == 1
+    if m.on_trial == 1:
+        _judge(fault, (m.t_imu - m.t_trial) * 1e-9 > c.trial_s, m, c)
+        fault = m.imu_fault == 1
+    if m.on_trial == 0 and (fault or doubtful):
+        m.on_trial = 1
+        m.t_trial = m.t_imu
+        m.evidence = 0.0
+        m.x[1] = m.x[0]
+        m.P[1] = m.P[0]
+
+
+@kernel
+def _judge(fault: bool, over: bool, m: Record, c: Record) -> None:
+    evidence = m.evidence
+    if fault:
+        if evidence < -c.evidence:
+            m.on_trial = 0
+            m.good_trials = 0
+        elif over:
+            m.on_trial = 0
+            m.good_trials = m.good_trials + 1 if evidence >= 0.0 else 0
+            if m.good_trials >= c.trials_to_clear:
+                _swap(0, m)
+    elif evidence > c.evidence:
+        _swap(1, m)
+    elif over:
+        m.on_trial = 0
+
+
+@kernel
+def _swap(fault: int, m: Record) -> None:
+    m.imu_fault = fault
+    m.on_trial = 0
+    m.good_trials = 0
+    m.x[0] = m.x[1]
+    m.P[0] = m.P[1]

@@ -1,0 +1,143 @@
+"""The event loop: a sorted batch of events through the filter, one row of output each.
+
+Replay calls it with a whole flight, the streaming estimator with one event at a time; both therefore give the same
+numbers to the last bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.kernels.measure import BLUR, FLOW, HEIGHT
+from axialnav.fusion.kernels.propagate import propagate
+from axialnav.fusion.kernels.reanchor import observe_source, reanchor
+from axialnav.fusion.kernels.rival import supervise_imu
+from axialnav.fusion.kernels.update import MIN_WEIGHT, fuse, is_uwb
+from axialnav.fusion.memory import (
+    LOG_CODE,
+    LOG_WEIGHT,
+    TRACK_FLAGS,
+    TRACK_POS_CROSS,
+    TRACK_RESETS,
+    TRACK_STATE,
+    TRACK_VARIANCE,
+    TRACK_VEL_CROSS,
+)
+from axialnav.fusion.outcome import Health, Reason
+from axialnav.models.jit import Record, Records, kernel
+from axialnav.models.state import E_POS, E_VEL, N_ERROR, N_NOMINAL, POS
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DEAD_RECKONING, VELOCITY_INVALID = int(Health.DEAD_RECKONING), int(Health.VELOCITY_INVALID)
+ACCELEROMETER_FAULT, UWB_SUSPECT = int(Health.ACCELEROMETER_FAULT), int(Health.UWB_SUSPECT)
+NOT_ALIGNED = int(Reason.NOT_ALIGNED)
+GAP_BLEND = 0.02
+SUSPECT_TRUST = 0.1
+
+
+@kernel
+def run(
+    t_ns: Ints,
+    source: Ints,
+    values: Array,
+    sources: Records,
+    core: Records,
+    memory: Records,
+    scratch: Records,
+    settings: Records,
+    track: Array,
+    log: Array,
+) -> int:
+    """Process sorted events; ``track`` gets a row per inertial sample, ``log`` (n, 10) a row per event.
+
+    Returns the number of track rows written.  A row of ``log`` holds in its first column the number of axes, or minus
+    the reason why the reading could not be used (0 for inertial samples).
+    """
+    m, w, c = core[0], scratch[0], settings[0]
+    rows = 0
+    for e in range(t_ns.shape[0]):
+        s, seen = sources[source[e]], memory[source[e]]
+        if s.kind == 0:
+            dt = propagate(t_ns[e], values[e], s.R_BS, m, w, c)
+            if dt > 0.0:
+                supervise_imu(dt, m, c)
+            write_track(m, track[rows])
+            track[rows, TRACK_FLAGS] = health(t_ns[e], sources, memory, m, c)
+            rows += 1
+        elif m.started == 0:
+            log[e, LOG_CODE] = -NOT_ALIGNED
+        else:
+            process(t_ns[e], s, seen, values[e], m, w, c, log[e])
+    return rows
+
+
+@kernel
+def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record, log: Array) -> None:
+    """One reading: bookkeeping, both filters, recovery."""
+    kind = s.kind
+    gap_s = (t_ns - seen.t_seen) * 1e-9
+    _note_arrival(t_ns, gap_s, kind, values, seen, m)
+    likelihood = fuse(0, t_ns, s, seen, values, m, w, c, log)
+    axes = int(log[LOG_CODE])
+    uwb = is_uwb(kind)
+    if axes > 0 and uwb:
+        observe_source(t_ns, gap_s, axes, log[LOG_WEIGHT], seen, w)
+    if m.on_trial == 1:
+        m.evidence += fuse(1, t_ns, s, seen, values, m, w, c, w.row) - likelihood
+    if axes > 0 and log[LOG_WEIGHT] > MIN_WEIGHT:
+        seen.t_fused = t_ns
+        if kind == FLOW or kind == BLUR:
+            m.t_flow = t_ns
+            m.t_aid = t_ns
+        elif uwb:
+            m.t_aid = t_ns
+    elif uwb:
+        reanchor(t_ns, seen, m, c)
+
+
+@kernel
+def _note_arrival(t_ns: int, gap_s: float, kind: int, values: Array, seen: Record, m: Record) -> None:
+    """Learn how often the source speaks and, for heights, where its zero is."""
+    if gap_s < 1.0:
+        known = np.isfinite(seen.gap_s)
+        seen.gap_s = seen.gap_s + GAP_BLEND * (gap_s - seen.gap_s) if known else max(gap_s, 1e-3)
+    seen.t_seen = t_ns
+    if kind == HEIGHT and not np.isfinite(seen.datum_m):
+        seen.datum_m = values[0] - m.x[0, POS + 2]
+
+
+@kernel
+def health(t_ns: int, sources: Records, memory: Records, m: Record, c: Record) -> int:
+    """Flags of :class:`~axialnav.fusion.outcome.Health` at ``t_ns``."""
+    flags = 0
+    silent_s = (t_ns - m.t_aid) * 1e-9
+    if silent_s > c.dead_reckoning_s:
+        flags |= DEAD_RECKONING
+    if silent_s > c.invalid_s:
+        flags |= VELOCITY_INVALID
+    if m.imu_fault == 1:
+        flags |= ACCELEROMETER_FAULT
+    for i in range(sources.shape[0]):
+        if is_uwb(sources[i].kind) and memory[i].trust < SUSPECT_TRUST:
+            flags |= UWB_SUSPECT
+    return flags
+
+
+@kernel
+def write_track(m: Record, row: Array) -> None:
+    """Write the estimate as one track row (layout in :mod:`axialnav.fusion.memory`)."""
+    x, P = m.x[0], m.P[0]
+    for i in range(N_NOMINAL):
+        row[TRACK_STATE + i] = x[i]
+    for i in range(N_ERROR):
+        row[TRACK_VARIANCE + i] = P[i, i]
+    row[TRACK_POS_CROSS] = P[E_POS, E_POS + 1]
+    row[TRACK_POS_CROSS + 1] = P[E_POS, E_POS + 2]
+    row[TRACK_POS_CROSS + 2] = P[E_POS + 1, E_POS + 2]
+    row[TRACK_VEL_CROSS] = P[E_VEL, E_VEL + 1]
+    row[TRACK_VEL_CROSS + 1] = P[E_VEL, E_VEL + 2]
+    row[TRACK_VEL_CROSS + 2] = P[E_VEL + 1, E_VEL + 2]
+    row[TRACK_RESETS] = m.resets

@@ -1,0 +1,114 @@
+"""One reading against one filter: innovation, gate, weight and correction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.kernels.covariance import correct, project
+from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_RANGE, measure
+from axialnav.fusion.memory import LOG_CODE, LOG_GATE, LOG_INNOVATION, LOG_NIS, LOG_VARIANCE, LOG_WEIGHT
+from axialnav.models.jit import Record, kernel
+from axialnav.models.rotations import matrix_from_quaternion
+from axialnav.models.state import E_VEL, N_ERROR, POS, QUAT, VEL
+
+Array = NDArray[np.float64]
+MIN_WEIGHT = 1e-3
+
+
+@kernel
+def is_uwb(kind: int) -> bool:
+    """Whether an event kind is UWB of any form."""
+    return UWB_RANGE <= kind <= UWB_POSITION
+
+
+@kernel
+def redescend(nis_per_axis: float, soft_nis: float) -> float:
+    """Weight of a reading inside its gate: Geman-McClure, 1 at the centre, 1/4 at ``soft_nis``.
+
+    Source: Geman and McClure (1987); used on UWB by the Crazyflie's estimator.
+    """
+    ratio = 1.0 / (1.0 + nis_per_axis / soft_nis)
+    return ratio * ratio
+
+
+@kernel
+def repetition(gap_s: float, correlation_s: float) -> float:
+    """How many readings that come every ``gap_s`` say the same thing: 1 + 2 tau / dt."""
+    return 1.0 + 2.0 * correlation_s / gap_s if gap_s > 0.0 else 1.0
+
+
+@kernel
+def fuse(
+    row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record, log: Array
+) -> float:
+    """Try one reading on filter ``row``; write its record to ``log`` (10,) and return its log-likelihood.
+
+    The log-likelihood is bounded (the NIS counts at most as much as the gate) and divided by the number of readings
+    that repeat each other.  Axes of one reading are gated together and fused one after the other.
+    """
+    x, P = m.x[row], m.P[row]
+    since_imu = (t_ns - m.t_imu) * 1e-9
+    for i in range(3):
+        w.p[i] = x[POS + i] + since_imu * x[VEL + i]
+    matrix_from_quaternion(x[QUAT], x[QUAT + 1], x[QUAT + 2], x[QUAT + 3], w.R)
+    axes = measure(s, seen, values, x, P, m, w, c)
+    log[LOG_CODE] = axes
+    if axes < 0:
+        return 0.0
+    repeated = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
+    nis, log_det = _innovate(axes, repeated, P, w, log)
+    gate = s.gate[axes - 1]
+    weight = redescend(nis / axes, s.soft_nis) if nis <= gate else 0.0
+    log[LOG_NIS], log[LOG_GATE], log[LOG_WEIGHT] = nis, gate, weight
+    if weight > MIN_WEIGHT:
+        _apply(axes, repeated / weight, x, P, w)
+        if row == 0:
+            for k in range(3):
+                m.correction[k] += w.step[E_VEL + k]
+    return -0.5 * (min(nis, gate) + log_det) / repeated
+
+
+@kernel
+def _innovate(axes: int, repeated: float, P: Array, w: Record, log: Array) -> tuple[float, float]:
+    """Normalised innovation squared of all axes jointly, and log det S, by one elimination pass."""
+    S, y = w.S, w.y
+    for i in range(axes):
+        y[i] = w.z[i] - w.h[i]
+        S[i, i] = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
+        log[LOG_INNOVATION + i] = y[i]
+        log[LOG_VARIANCE + i] = S[i, i]
+        for j in range(i + 1, axes):
+            cross = 0.0
+            for k in range(N_ERROR):
+                cross += w.H[j, k] * w.PHt[k]
+            S[j, i] = cross
+            S[i, j] = cross
+    nis, log_det = 0.0, 0.0
+    for i in range(axes):
+        pivot = S[i, i]
+        nis += y[i] * y[i] / pivot
+        log_det += math.log(pivot)
+        for j in range(i + 1, axes):
+            factor = S[j, i] / pivot
+            y[j] -= factor * y[i]
+            for k in range(i + 1, axes):
+                S[j, k] -= factor * S[i, k]
+    return nis, log_det
+
+
+@kernel
+def _apply(axes: int, inflation: float, x: Array, P: Array, w: Record) -> None:
+    """Fuse the axes one by one; each innovation is taken after the corrections before it (to first order)."""
+    for k in range(N_ERROR):
+        w.step[k] = 0.0
+    for i in range(axes):
+        S = project(P, w.H[i], w.PHt) + w.variance[i] * inflation
+        innovation = w.z[i] - w.h[i]
+        for k in range(N_ERROR):
+            innovation -= w.H[i, k] * w.step[k]
+        correct(x, P, w.PHt, S, innovation, w.gain)
+        for k in range(N_ERROR):
+            w.step[k] += w.gain[k] * innovation

@@ -1,0 +1,157 @@
+"""Everything the filter remembers, as two structured arrays.
+
+Each is one block of memory with named float64 and int64 fields: kernels receive a single pointer, a copy of the arrays
+is a snapshot of the filter, and equal arrays mean equal behaviour from there on.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.errors import ConfigError
+from axialnav.models.rig import Imu
+from axialnav.models.state import N_ERROR, N_NOMINAL
+
+Array = NDArray[np.float64]
+Records = NDArray[np.void]
+LONG_AGO: Final = np.iinfo(np.int64).min // 4
+
+MEMORY: Final = np.dtype(
+    [
+        # row 0 is the estimate, row 1 the rival that runs while the accelerometer is in doubt
+        ("x", "f8", (2, N_NOMINAL)),
+        ("P", "f8", (2, N_ERROR, N_ERROR)),
+        ("imu", "f8", 6),  # last sample, body axes: rate, specific force
+        ("t_imu", "i8"),
+        ("t_aid", "i8"),  # last axial aid of any kind
+        ("t_flow", "i8"),  # last pixel motion
+        ("started", "i8"),
+        ("resets", "i8"),
+        ("last_reset_m", "f8", 3),
+        ("imu_fault", "i8"),
+        ("on_trial", "i8"),
+        ("t_trial", "i8"),
+        ("good_trials", "i8"),
+        ("evidence", "f8"),  # log-likelihood of the rival minus that of the estimate
+        ("correction", "f8", 3),  # sum of velocity corrections since the last inertial step [m/s]
+        ("correction_rate", "f8", 3),  # their fading mean [m/s^2]
+    ],
+    align=True,
+)
+
+SOURCE_MEMORY: Final = np.dtype(
+    [
+        ("t_seen", "i8"),
+        ("t_fused", "i8"),
+        ("t_trusted", "i8"),  # last time the mean weight was good
+        ("gap_s", "f8"),  # mean time between readings
+        ("datum_m", "f8"),  # zero of a height sensor
+        ("trust", "f8"),  # mean weight
+        # fading least-squares fit of a position offset to the innovations
+        ("fit", "f8", (3, 3)),
+        ("fit_rhs", "f8", 3),
+        ("fit_energy", "f8"),
+    ],
+    align=True,
+)
+
+SCRATCH: Final = np.dtype(
+    [
+        ("z", "f8", 3), ("h", "f8", 3), ("variance", "f8", 3), ("H", "f8", (3, N_ERROR)), ("S", "f8", (3, 3)),
+        ("y", "f8", 3), ("PHt", "f8", N_ERROR), ("gain", "f8", N_ERROR), ("step", "f8", N_ERROR), ("R", "f8", (3, 3)),
+        ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 8), ("p", "f8", 3), ("mean_imu", "f8", 6),
+        ("focal_window", "f8", 2), ("row", "f8", 10),
+    ],
+    align=True,
+)  # fmt: skip
+
+# layout of a track row: nominal state, variances of the error state, off-diagonals of position and velocity, rest
+TRACK_STATE, TRACK_VARIANCE, TRACK_POS_CROSS, TRACK_VEL_CROSS = 0, 19, 37, 40
+TRACK_FLAGS, TRACK_RESETS = 43, 44
+TRACK_WIDTH: Final = 45
+
+# layout of a log row
+LOG_CODE, LOG_INNOVATION, LOG_VARIANCE, LOG_NIS, LOG_GATE, LOG_WEIGHT = 0, 1, 4, 7, 8, 9
+LOG_WIDTH: Final = 10
+
+
+class Memory(NamedTuple):
+    """State of the filter between two events: one record of itself, one per source."""
+
+    core: Records  # (1,) of MEMORY
+    sources: Records  # (S,) of SOURCE_MEMORY
+
+    def copy(self) -> Memory:
+        """Independent snapshot."""
+        return Memory(self.core.copy(), self.sources.copy())
+
+
+def new_memory(n_sources: int) -> Memory:
+    """Memory of a filter that has not started."""
+    sources = np.zeros(n_sources, SOURCE_MEMORY)
+    for stamp in ("t_seen", "t_fused", "t_trusted"):
+        sources[stamp] = LONG_AGO
+    sources["gap_s"] = sources["datum_m"] = np.nan
+    sources["trust"] = 1.0
+    return Memory(np.zeros(1, MEMORY), sources)
+
+
+def new_scratch() -> Records:
+    """Working space of the kernels, shape (1,); nothing in it survives an event."""
+    return np.zeros(1, SCRATCH)
+
+
+SETTINGS_FIELDS: Final = (
+    "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
+    "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_variance", "uwb_bias_time_s",
+    "wall_offset_walk", "uwb_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s", "evidence", "trials_to_clear",
+    "dead_reckoning_s", "invalid_s", "reanchor_aided_s", "reanchor_alone_s",
+)  # fmt: skip
+SETTINGS: Final = np.dtype([(name, "f8") for name in SETTINGS_FIELDS])
+
+
+def build_settings(config: Config) -> Records:
+    """Translate ``config`` into the kernels' numbers, shape (1,); variances are per second unless named otherwise.
+
+    Raises
+    ------
+    ConfigError
+        Not exactly one enabled inertial unit.
+    """
+    imus = [s for name, s in config.sensor.items() if isinstance(s, Imu) and name not in config.disabled]
+    if len(imus) != 1:
+        raise ConfigError(f"the filter needs exactly one inertial unit, got {len(imus)}; add or disable [sensor.imuN]")
+    imu, tune, fault = imus[0], config.imu, config.imu_fault
+    accel = (imu.accel_noise_density * tune.accel_noise_scale) ** 2
+    axis = config.axis
+    values: dict[str, Any] = dict(
+        gravity_m_s2=config.gravity_m_s2,
+        axial_x=axis[0],
+        axial_y=axis[1],
+        axial_z=axis[2],
+        gyro_variance=(imu.gyro_noise_density * tune.gyro_noise_scale) ** 2,
+        gyro_walk=imu.gyro_bias_walk**2,
+        accel_variance=accel,
+        accel_walk=imu.accel_bias_walk**2,
+        fault_accel_variance=accel * fault.noise_scale**2,
+        fault_accel_walk=fault.bias_walk**2,
+        blur_scale_walk=config.flow.scale_walk**2,
+        uwb_bias_variance=config.uwb.bias_sigma_m**2,
+        uwb_bias_time_s=config.uwb.bias_time_s,
+        wall_offset_walk=config.range.offset_walk_m**2,
+        uwb_correlation_s=config.uwb.correlation_time_s,
+        doubt_m_s2=fault.doubt_m_s2 if fault.enabled else np.inf,
+        doubt_time_s=fault.doubt_time_s,
+        trial_s=fault.trial_s,
+        evidence=fault.evidence,
+        trials_to_clear=float(fault.trials_to_clear),
+        dead_reckoning_s=config.supervisor.dead_reckoning_s,
+        invalid_s=config.supervisor.invalid_s,
+        reanchor_aided_s=config.supervisor.reanchor_aided_s,
+        reanchor_alone_s=config.supervisor.reanchor_alone_s,
+    )
+    return np.array([tuple(float(values[name]) for name in SETTINGS_FIELDS)], dtype=SETTINGS)

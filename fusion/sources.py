@@ -1,0 +1,186 @@
+"""Sensors as the compiled kernels see them: one row per source, built from the configuration."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincinv
+
+from axialnav.fusion.config import Config, Gate
+from axialnav.fusion.errors import ConfigError
+from axialnav.models.rig import (
+    AnySensor,
+    AttitudeSource,
+    Barometer,
+    BlurMeter,
+    Camera,
+    Flow,
+    Imu,
+    RangeFinder,
+    Surface,
+    Uwb,
+)
+
+Records = NDArray[np.void]
+
+
+class Kind(IntEnum):
+    """Kinds of events; at equal stamps they are processed in this order."""
+
+    IMU = 0
+    RANGE = 1
+    FLOW = 2
+    BLUR = 3
+    UWB_RANGE = 4
+    UWB_TDOA = 5
+    UWB_POSITION = 6
+    HEIGHT = 7
+    ATTITUDE = 8
+
+
+MAX_ANCHORS = 64
+
+SOURCE = np.dtype(
+    [
+        ("kind", "i8"),
+        ("enabled", "?"),
+        ("sigma", "f8"),
+        ("gate", "f8", 3),  # chi-square threshold for 1, 2, 3 axes
+        ("soft_nis", "f8"),
+        ("R_BS", "f8", (3, 3)),
+        ("lever_B", "f8", 3),
+        ("focal_px", "f8", 2),
+        ("normal_W", "f8", 3),
+        ("offset_m", "f8"),
+        ("offset_is_state", "?"),
+        ("low", "f8"),
+        ("high", "f8"),
+        ("anchors", "f8", (MAX_ANCHORS, 3)),
+        ("n_anchors", "i8"),
+    ],
+    align=True,
+)
+
+
+def chi_square_threshold(dof: int, probability: float) -> float:
+    """Value that a chi-square variable with ``dof`` degrees of freedom stays below with ``probability``."""
+    return float(2.0 * gammaincinv(0.5 * dof, probability))
+
+
+def kind_of(spec: AnySensor) -> Kind | None:
+    """Event kind of a sensor, or None for sensors that are not fused themselves (cameras, GPS)."""
+    match spec:
+        case Uwb(measurement=measurement):
+            return {"range": Kind.UWB_RANGE, "tdoa": Kind.UWB_TDOA, "position": Kind.UWB_POSITION}[measurement]
+        case Imu():
+            return Kind.IMU
+        case RangeFinder():
+            return Kind.RANGE
+        case Flow():
+            return Kind.FLOW
+        case BlurMeter(signed=signed):
+            return Kind.FLOW if signed else Kind.BLUR
+        case Barometer():
+            return Kind.HEIGHT
+        case AttitudeSource():
+            return Kind.ATTITUDE
+        case _:
+            return None
+
+
+def fused_sensors(config: Config) -> tuple[str, ...]:
+    """Names of the sensors that become sources, in the fixed order that breaks ties between equal stamps."""
+    kinds = {name: kind_of(spec) for name, spec in config.sensor.items()}
+    return tuple(sorted((n for n, k in kinds.items() if k is not None), key=lambda n: (kinds[n] or 0, n)))
+
+
+def build_sources(config: Config) -> Records:
+    """Build one record per fused sensor of ``config``, in the order of :func:`fused_sensors`; shape (S,).
+
+    Raises
+    ------
+    ConfigError
+        A sensor refers to a surface that is not described, or UWB ranging without anchors or with too many.
+    """
+    names = fused_sensors(config)
+    sources = np.zeros(len(names), SOURCE)
+    for source, name in zip(sources, names, strict=True):
+        for field, value in _row(name, config.sensor[name], config).items():
+            if field == "anchors":
+                source["anchors"][: len(value)] = np.array(value, dtype=np.float64).reshape(-1, 3)
+                source["n_anchors"] = len(value)
+            else:
+                source[field] = value
+    return sources
+
+
+def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
+    kind = kind_of(spec)
+    assert kind is not None
+    sigma, gate = _noise(spec, config)
+    row: dict[str, Any] = {
+        "kind": int(kind),
+        "enabled": name not in config.disabled,
+        "sigma": sigma,
+        "gate": [chi_square_threshold(dof, gate.probability) for dof in (1, 2, 3)],
+        "soft_nis": gate.soft_sigma**2,
+        "R_BS": spec.rotation_BS,
+        "lever_B": spec.lever_arm_m,
+        "focal_px": [1.0, 1.0],
+        "normal_W": [0.0, 0.0, 1.0],
+        "offset_m": 0.0,
+        "offset_is_state": False,
+        "low": -np.inf,
+        "high": np.inf,
+        "anchors": [],
+    }
+    if isinstance(spec, Flow | BlurMeter | RangeFinder):
+        surface = _surface(name, spec.surface, config)
+        known = surface.offset_m != "unknown"
+        row |= {
+            "normal_W": surface.normal,
+            "offset_m": surface.offset_m if known else 0.0,
+            "offset_is_state": not known,
+        }
+    if isinstance(spec, Flow | BlurMeter):
+        row |= {"focal_px": spec.focal_px, "low": config.flow.min_quality}
+    if isinstance(spec, RangeFinder):
+        row |= {"low": spec.range_min_m, "high": spec.range_max_m}
+    if isinstance(spec, Uwb):
+        if spec.measurement != "position" and not spec.anchors:
+            raise ConfigError(
+                f"sensor.{name}: UWB {spec.measurement} needs anchors, got none; list them as {{id = [x, y, z]}}"
+            )
+        if len(spec.anchors) > MAX_ANCHORS:
+            raise ConfigError(f"sensor.{name}: {len(spec.anchors)} anchors, the limit is {MAX_ANCHORS}; split the list")
+        row["anchors"] = list(spec.anchors.values())
+    return row
+
+
+def _surface(sensor: str, name: str, config: Config) -> Surface:
+    if name not in config.surface:
+        known = ", ".join(config.surface) or "none"
+        raise ConfigError(f"sensor.{sensor} looks at surface {name!r}, which is not described; surfaces: {known}")
+    return config.surface[name]
+
+
+def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:
+    match spec:
+        case Uwb(sigma_m=sigma):
+            # the receiver's own claim is a floor's business: errors are correlated in time
+            return max(sigma or 0.0, config.uwb.sigma_m), config.uwb.gate
+        case Flow(sigma_px=sigma):
+            return sigma or config.flow.sigma_px, config.flow.gate
+        case BlurMeter():
+            return config.flow.sigma_px, config.flow.gate
+        case RangeFinder(sigma_m=sigma):
+            return sigma or config.range.sigma_m, config.range.gate
+        case Barometer(sigma_m=sigma):
+            return sigma or config.height.sigma_m, config.height.gate
+        case AttitudeSource(sigma_rad=sigma):
+            return sigma or config.attitude.sigma_rad, config.attitude.gate
+        case Imu() | Camera() | _:
+            return 1.0, Gate()

@@ -1,0 +1,82 @@
+r"""Ultra-wideband: range to an anchor, range difference (TDoA) and the receiver's own position.
+
+With the antenna at :math:`p_A = p + R\,l` and the additive bias state :math:`b`,
+
+.. math:: r = |p_A - a| + b, \qquad d = |p_A - a_b| - |p_A - a_a| + b, \qquad z_i = p_{A,i} + b\,(e_i \cdot x)
+
+Reflections only lengthen paths, come in episodes and are the gate's and the supervisor's business, not the model's.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.models.jit import kernel
+from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, UWB_BIAS
+
+Array = NDArray[np.float64]
+MIN_RANGE_M = 0.05  # nearer, the direction to the anchor is undefined
+
+
+@kernel
+def _add_direction(R_WB: Array, lever_B: Array, u0: float, u1: float, u2: float, H: Array) -> None:
+    """Add the derivative of ``u . p_A`` (u fixed, world axes) to the Jacobian row."""
+    H[E_POS] += u0
+    H[E_POS + 1] += u1
+    H[E_POS + 2] += u2
+    b0 = R_WB[0, 0] * u0 + R_WB[1, 0] * u1 + R_WB[2, 0] * u2
+    b1 = R_WB[0, 1] * u0 + R_WB[1, 1] * u1 + R_WB[2, 1] * u2
+    b2 = R_WB[0, 2] * u0 + R_WB[1, 2] * u1 + R_WB[2, 2] * u2
+    H[E_ATT] += lever_B[1] * b2 - lever_B[2] * b1
+    H[E_ATT + 1] += lever_B[2] * b0 - lever_B[0] * b2
+    H[E_ATT + 2] += lever_B[0] * b1 - lever_B[1] * b0
+
+
+@kernel
+def _range_to(p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, sign: float, H: Array) -> float:
+    d0 = p_W[0] + R_WB[0, 0] * lever_B[0] + R_WB[0, 1] * lever_B[1] + R_WB[0, 2] * lever_B[2] - anchor[0]
+    d1 = p_W[1] + R_WB[1, 0] * lever_B[0] + R_WB[1, 1] * lever_B[1] + R_WB[1, 2] * lever_B[2] - anchor[1]
+    d2 = p_W[2] + R_WB[2, 0] * lever_B[0] + R_WB[2, 1] * lever_B[1] + R_WB[2, 2] * lever_B[2] - anchor[2]
+    distance = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    if distance < MIN_RANGE_M:
+        return np.nan
+    scale = sign / distance
+    _add_direction(R_WB, lever_B, scale * d0, scale * d1, scale * d2, H)
+    return distance
+
+
+@kernel
+def uwb_range(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, H: Array) -> float:
+    """Predict the range to ``anchor`` (3,) [m] and add its Jacobian to the zeroed row ``H`` (18,)."""
+    H[E_UWB_BIAS] = 1.0
+    return _range_to(p_W, R_WB, lever_B, anchor, 1.0, H) + x[UWB_BIAS]
+
+
+@kernel
+def uwb_tdoa(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor_a: Array, anchor_b: Array, H: Array) -> float:
+    """Predict ``d(b) - d(a)`` [m] and add its Jacobian to the zeroed row ``H`` (18,)."""
+    H[E_UWB_BIAS] = 1.0
+    far = _range_to(p_W, R_WB, lever_B, anchor_b, 1.0, H)
+    near = _range_to(p_W, R_WB, lever_B, anchor_a, -1.0, H)
+    return far - near + x[UWB_BIAS]
+
+
+@kernel
+def uwb_position(x: Array, p_W: Array, R_WB: Array, lever_B: Array, axial: float, axis: int, H: Array) -> float:
+    """Predict coordinate ``axis`` of the antenna [m]; the bias enters by ``axial``, that axis of the corridor's direction."""
+    u0, u1, u2 = 0.0, 0.0, 0.0
+    if axis == 0:
+        u0 = 1.0
+    elif axis == 1:
+        u1 = 1.0
+    else:
+        u2 = 1.0
+    _add_direction(R_WB, lever_B, u0, u1, u2, H)
+    H[E_UWB_BIAS] = axial
+    antenna = p_W[axis]
+    for k in range(3):
+        antenna += R_WB[axis, k] * lever_B[k]
+    return antenna + axial * x[UWB_BIAS]
