@@ -11,6 +11,7 @@ from typing import Any
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.outcome import InnovationLog, Track
+from axialnav.models.rig import Imu
 from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.fused import Column, digest, fused_columns
 
@@ -95,8 +96,8 @@ def replay(
     from axialnav.replay.metrics import score
 
     _refuse_unknown(estimator, smooth)
-    started = time.perf_counter()
     loaded = flight if isinstance(flight, Flight) else load_flight(flight)
+    started = time.perf_counter()
     resolved = resolve(config, loaded, without=without, params=params)
     track, log, kernel_s = _filter(loaded, resolved, progress)
     columns = fused_columns(track, resolved.corridor)
@@ -128,9 +129,10 @@ def _filter(
 ) -> tuple[Track, InnovationLog, float]:
     from axialnav.fusion.batch import run_batch
 
+    if not any(isinstance(spec, Imu) and len(flight.tables.get(name, ())) for name, spec in config.sensor.items()):
+        there = ", ".join(flight.tables) or "nothing"
+        raise FlightError(f"flight {flight.name}: no IMU sample to replay, it holds {there}; the filter needs imu0")
     result = run_batch(config, flight.tables, progress)
-    if result.track.t_ns.size == 0:
-        raise FlightError(f"flight {flight.name}: no IMU sample to replay; the filter needs an imu0 table")
     return result.track, result.log, result.kernel_s
 
 
