@@ -21,8 +21,9 @@ from axialnav.models.rig import AnySensor, Camera, Flow, Gps, Uwb
 from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable, Stamps
 from axialnav.replay.readers import columns as c
 from axialnav.replay.readers.flight_folder import TRUTH_FOLDER
-from axialnav.replay.readers.sensor_yaml import FORMS, anchor_name
+from axialnav.replay.readers.sensor_yaml import anchor_name
 from axialnav.replay.readers.tables import half_window_ns, layout_of
+from axialnav.replay.readers.yaml_forms import FORMS
 
 _UNSAFE = frozenset(",#\r\n")
 

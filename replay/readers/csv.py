@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.errors import FlightError
+from axialnav.replay.readers.cells import STAMP_LIMIT, parse_row, split_fields
 from axialnav.replay.readers.columns import Column, Layout
 from axialnav.replay.readers.dropped import DropLog
 from axialnav.replay.readers.header import STAMP_NAMES, place_columns, split_header
 
-STAMP_LIMIT = 2**62
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_WHOLE = re.compile(r"[+-]?\d{1,19}(\.0*)?")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*([eE][+-]?\d+)?|\.\d+([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+HEAD_LENGTH = 10_000
+_NUMBER_STARTS = frozenset("0123456789+-")
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,12 @@ def read_rows(path: Path, layout: Layout, sensor: str, drops: DropLog) -> Rows:
         text = path.read_bytes().decode("utf-8-sig", errors="replace")
     except OSError as error:
         raise FlightError(f"{path}: cannot be read: {error.strerror or error}") from None
-    header, first = _head(text)
-    if first is None:
+    header, start = _head(text)
+    if start is None:
         return _no_rows(where, text)
-    width = _width(header, text)
+    first = [line for _, line in islice(_data_lines(text[start : start + HEAD_LENGTH]), 5)]
+    _require_commas(first[0], layout, where)
+    width = _width(header, first)
     placed = place_columns(header, width, layout, where, drops)
     for index, column in enumerate(placed):
         if column is None:
@@ -106,8 +108,8 @@ def _no_rows(where: str, text: str) -> Rows:
     return Rows(where, np.zeros(0, dtype=np.int64), {}, text, np.zeros(0, dtype=np.int64))
 
 
-def _head(text: str) -> tuple[list[tuple[str, str]] | None, str | None]:
-    """Header (names and units), if there is one, and the first line of data, if there is one."""
+def _head(text: str) -> tuple[list[tuple[str, str]] | None, int | None]:
+    """Header (names and units), if there is one, and where the first line of data begins, if there is one."""
     header = None
     for match in re.finditer(r"[^\r\n]+", text):
         line = match.group().strip()
@@ -119,26 +121,30 @@ def _head(text: str) -> tuple[list[tuple[str, str]] | None, str | None]:
         elif _is_header(line):
             header = names
         else:
-            return header, line
+            return header, match.start()
     return header, None
 
 
-def _width(header: list[tuple[str, str]] | None, text: str) -> int:
+def _require_commas(line: str, layout: Layout, where: str) -> None:
+    """Refuse files with another separator, as spreadsheets write them where the comma is the decimal sign."""
+    needed = sum(column.required for column in layout)
+    for separator, name in ((";", "semicolons"), ("\t", "tabs"), (" ", "spaces")):
+        found = line.count(separator)
+        if found >= max(needed, 2) or (found and len(split_fields(line)) <= needed):
+            if separator == " " and "," in line:
+                continue
+            raise FlightError(f"{where}: values are separated by {name}, must be by commas; convert the file")
+
+
+def _width(header: list[tuple[str, str]] | None, lines: list[str]) -> int:
     """Columns of the file: those of the header, or more where the first rows agree on more."""
-    counts = sorted(len(_fields(line)) for _, line in islice(_data_lines(text), 5))
+    counts = sorted(len(split_fields(line)) for line in lines)
     return max(len(header or ()), counts[len(counts) // 2])
 
 
 def _is_header(line: str) -> bool:
     """Whether a line without ``#`` is a header: it names the stamp."""
-    return split_header(line)[:1] != [] and split_header(line)[0][0] in STAMP_NAMES
-
-
-def _fields(line: str) -> list[str]:
-    fields = [part.strip() for part in line.partition("#")[0].split(",")]
-    if len(fields) > 1 and not fields[-1]:
-        fields.pop()
-    return fields
+    return line[0] not in _NUMBER_STARTS and any(name in STAMP_NAMES for name, _ in split_header(line))
 
 
 def _data_lines(text: str) -> Iterator[tuple[int, str]]:
@@ -186,40 +192,19 @@ def _parse_slow(text: str, placed: list[Column | None], where: str, sensor: str,
     places = [i for i, column in enumerate(placed, start=1) if column is not None and column.required]
     needed = 1 + max(places, default=0)
     for number, line in _data_lines(text):
-        fields = _fields(line)
-        row = _parse_row(fields, placed, width, needed)
+        fields = split_fields(line)
+        row = parse_row(fields, placed, width, needed)
         if isinstance(row, str):
             bad.setdefault(row, []).append(f"line {number}: {line}")
             continue
         numbers.append(number)
-        stamps.append(int(fields[0].partition(".")[0]))
+        stamps.append(row[0])
         rows.append(row)
     for reason, examples in bad.items():
         drops.add(sensor, reason, len(examples), examples[0])
     values: dict[Column, NDArray[Any]] = {}
     for index, column in enumerate(placed):
         if column is not None:
-            cells = [row[index] for row in rows]
+            cells = [row[index + 1] for row in rows]
             values[column] = np.array(cells, dtype=np.str_ if column.text else np.float64)
     return Rows(where, np.array(stamps, dtype=np.int64), values, text, np.array(numbers, dtype=np.int64))
-
-
-def _parse_row(fields: list[str], placed: list[Column | None], width: int, needed: int) -> list[Any] | str:
-    """Values of a row in the order of the file, or the reason why it cannot be used."""
-    if len(fields) < needed:
-        return f"row too short (needs {needed} values)"
-    if len(fields) > width:
-        return f"row too long (the file has {width} columns)"
-    if not _WHOLE.fullmatch(fields[0]) or abs(int(fields[0].partition(".")[0])) >= STAMP_LIMIT:
-        return "timestamp is not a whole number of nanoseconds below 2**62"
-    row: list[Any] = []
-    for column, cell in zip(placed, [*fields[1:], *[""] * (width - len(fields))], strict=True):
-        if column is None or column.text:
-            row.append(cell)
-        elif not cell:
-            row.append(np.nan)
-        elif _NUMBER.fullmatch(cell):
-            row.append(float(cell))
-        else:
-            return "not a number"
-    return row

@@ -48,7 +48,8 @@ def _read(root: Path, mav0: Path) -> Flight:
     truth = _read_truth(mav0 / TRUTH_FOLDER, drops)
     if not any(len(tables[name]) and isinstance(spec, Imu | Camera) for name, spec in specs.items() if name in tables):
         found = ", ".join(sorted(folder.name for folder in mav0.iterdir() if folder.is_dir())) or "nothing"
-        why = "; ".join(f"{drop.sensor}: {drop.reason}" for drop in drops.as_tuple()[:3])
+        worst = sorted(drops.as_tuple(), key=lambda drop: -drop.count)[:3]
+        why = "; ".join(f"{drop.sensor}: {drop.reason} ({drop.count})" for drop in worst)
         raise FlightError(
             f"{mav0}: no usable IMU sample and no camera frame (found: {found}){'; ' + why if why else ''}; "
             f"a flight needs at least imu0/data.csv or cam0/data.csv"

@@ -2,51 +2,18 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.fusion.errors import FlightError
+from axialnav.replay.readers.clock import check_clock
 from axialnav.replay.readers.columns import Column, Layout
 from axialnav.replay.readers.csv import Rows
 from axialnav.replay.readers.dropped import DropLog
+from axialnav.replay.readers.sieve import Sieve
 
-Mask = NDArray[np.bool_]
-FAR_NS = 10_000_000_000
-JUMP_NS = 1_000_000_000
-HOUR_NS = 3_600_000_000_000
 QUATERNION_TOLERANCE = 0.01
-
-
-class Sieve:
-    """Rows that are still in use, and the log of those that are not.
-
-    Parameters
-    ----------
-    rows
-        Rows as read, in file order.
-    sensor
-        Name for the log.
-    drops
-        The log.
-    """
-
-    def __init__(self, rows: Rows, sensor: str, drops: DropLog) -> None:
-        self.rows = rows
-        self.sensor = sensor
-        self._drops = drops
-
-    def refuse(self, bad: Mask, reason: str) -> None:
-        """Leave out the rows in ``bad``."""
-        if bad.any():
-            self.note(bad, reason)
-            self.rows = self.rows.subset(~bad)
-
-    def note(self, which: Mask, reason: str) -> None:
-        """Log rows that stay in use."""
-        self._drops.add(self.sensor, reason, int(which.sum()), self.rows.example(int(which.argmax())))
 
 
 def usable_rows(
@@ -73,7 +40,7 @@ def usable_rows(
         _check_values(sieve, layout)
         _check_pairs(sieve)
         _check_duplicates(sieve)
-        _check_clock(sieve, span_ns)
+        check_clock(sieve, span_ns)
         _sort(sieve)
     return sieve.rows
 
@@ -145,73 +112,6 @@ def _check_duplicates(sieve: Sieve) -> None:
     conflicting[order] = repeated & ~equal
     sieve.refuse(identical, "duplicate row")
     sieve.refuse(conflicting[~identical], "other values for a stamp already read")
-
-
-def _check_clock(sieve: Sieve, span_ns: tuple[int, int] | None) -> None:
-    t_ns = sieve.rows.t_ns
-    steps = np.diff(t_ns)
-    if len(steps) and (steps.min() < 0 or steps.max() > JUMP_NS):
-        sieve.refuse(_glitches(t_ns), "clock jump: the stamp leaves its neighbours by more than 1 s and returns")
-        _refuse_restart(sieve)
-        sieve.refuse(_islands(sieve.rows.t_ns), "clock jump: the stamp is far from the rest of the file")
-    if span_ns is not None and len(sieve.rows.t_ns):
-        t_ns = sieve.rows.t_ns
-        outside = (t_ns < span_ns[0] - FAR_NS) | (t_ns > span_ns[1] + FAR_NS)
-        sieve.refuse(outside, "stamp more than 10 s outside the IMU's time: another clock?")
-
-
-def _runs(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Borders (first rows, and the end) of the stretches in file order without a step beyond 1 s."""
-    cuts = np.flatnonzero(np.abs(np.diff(t_ns)) > JUMP_NS) + 1
-    return np.concatenate(([0], cuts, [len(t_ns)]))
-
-
-def _glitches(t_ns: NDArray[np.int64]) -> Mask:
-    """Up to three rows that lie elsewhere in time while the rows around them follow each other closely."""
-    bad = np.zeros(len(t_ns), dtype=np.bool_)
-    if np.count_nonzero(np.diff(t_ns) < 0) > 0.05 * len(t_ns):
-        return bad  # a shuffled file: neighbours say nothing
-    borders = _runs(t_ns)
-    for start, end in pairwise(borders[1:-1]):
-        if end - start <= 3 and 0 <= t_ns[end] - t_ns[start - 1] <= JUMP_NS:
-            bad[start:end] = True
-    return bad
-
-
-def _refuse_restart(sieve: Sieve) -> None:
-    """Raise when long stretches of the file overlap in time, as after a restart of the clock."""
-    t_ns = sieve.rows.t_ns
-    borders = _runs(t_ns)
-    if np.count_nonzero(np.diff(t_ns) < -JUMP_NS) > 5:
-        return
-    stretches = [(a, b) for a, b in pairwise(borders) if b - a >= 10]
-    for (a, b), (c, d) in pairwise(stretches):
-        overlap_ns = min(t_ns[a:b].max(), t_ns[c:d].max()) - max(t_ns[a:b].min(), t_ns[c:d].min())
-        if overlap_ns > JUMP_NS:
-            raise FlightError(
-                f"{sieve.rows.where}: the clock starts again at {sieve.rows.example(int(c)).partition(':')[0]}: "
-                f"{(t_ns[b - 1] - t_ns[c]) / 1e9:.1f} s back, and {overlap_ns / 1e9:.1f} s are covered twice "
-                f"(limit 1 s); split the recording there"
-            )
-
-
-def _islands(t_ns: NDArray[np.int64]) -> Mask:
-    """Small groups of rows far from the main body: over 10 s away and under 1 % of it, or over an hour away."""
-    order = np.argsort(t_ns, kind="stable")
-    gaps = np.diff(t_ns[order])
-    cuts = np.flatnonzero(gaps > FAR_NS)
-    bad = np.zeros(len(t_ns), dtype=np.bool_)
-    if not len(cuts):
-        return bad
-    borders = np.concatenate(([0], cuts + 1, [len(t_ns)]))
-    sizes = np.diff(borders)
-    main = int(sizes.argmax())
-    for group, size in enumerate(sizes):
-        if group != main:
-            away_ns = int(gaps[cuts[min(group, main) : max(group, main)]].max())
-            if away_ns > HOUR_NS or size < 0.01 * sizes[main]:
-                bad[order[borders[group] : borders[group + 1]]] = True
-    return bad
 
 
 def _sort(sieve: Sieve) -> None:

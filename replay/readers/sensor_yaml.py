@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,67 +14,11 @@ import msgspec
 import yaml
 
 from axialnav.fusion.errors import FlightError
-from axialnav.models.rig import (
-    AnySensor,
-    AttitudeSource,
-    Barometer,
-    BlurMeter,
-    Camera,
-    Flow,
-    Gps,
-    Imu,
-    RangeFinder,
-    Sensor,
-    Uwb,
-)
+from axialnav.models.rig import AnySensor, Camera, Uwb
 from axialnav.replay.readers.dropped import DropLog
 from axialnav.replay.readers.flight_toml import not_finite
+from axialnav.replay.readers.yaml_forms import FORMS, YamlForm
 
-
-@dataclass(frozen=True)
-class YamlForm:
-    """How one kind of sensor is written in ``sensor.yaml``.
-
-    Attributes
-    ----------
-    kind
-        Structure that describes the sensor.
-    sensor_type
-        Value of ``sensor_type`` as written; ``also`` are others that are understood.
-    folder
-        Name of the folder without its number.
-    rename
-        Key in the file -> field of ``kind``, where they differ.
-    quiet
-        Keys of EuRoC that say nothing that the project needs.
-    """
-
-    kind: type[Sensor]
-    sensor_type: str
-    folder: str
-    also: tuple[str, ...] = ()
-    rename: Mapping[str, str] = field(default_factory=dict)
-    quiet: tuple[str, ...] = ("sensor_type", "comment")
-
-
-_IMU_KEYS = {
-    "gyroscope_noise_density": "gyro_noise_density",
-    "gyroscope_random_walk": "gyro_bias_walk",
-    "accelerometer_noise_density": "accel_noise_density",
-    "accelerometer_random_walk": "accel_bias_walk",
-}
-_FOCAL = {"intrinsics": "focal_px"}
-FORMS = (
-    YamlForm(Imu, "imu", "imu", rename=_IMU_KEYS),
-    YamlForm(Camera, "camera", "cam"),
-    YamlForm(BlurMeter, "blur", "blur", also=("blur_meter", "motion_blur"), rename=_FOCAL),
-    YamlForm(Flow, "optical_flow", "flow", also=("flow",), rename=_FOCAL),
-    YamlForm(RangeFinder, "range_finder", "tof", also=("tof", "range")),
-    YamlForm(Uwb, "uwb", "uwb"),
-    YamlForm(Barometer, "barometer", "baro", also=("height",)),
-    YamlForm(AttitudeSource, "attitude", "att"),
-    YamlForm(Gps, "gps", "gps"),
-)
 _FIELD = re.compile(r"missing required field `(?P<field>[^`]+)`")
 _DIRECTIVE = re.compile(r"\A\ufeff?%YAML[: ][^\n]*\n(---[^\n]*\n)?")
 _MANY = 1_000_000

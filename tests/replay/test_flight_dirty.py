@@ -44,6 +44,7 @@ DIRT: dict[str, tuple[Callable[[Lines], Lines], str, int, int]] = {
     "infinite": (lambda r: with_cell(r, 4, 4, "inf"), "a_RS_S_x outside -2000..2000 m s^-2", 1, 6),
     "absurd": (lambda r: with_cell(r, 4, 1, "-1e9"), "w_RS_S_x outside -200..200 rad s^-1", 1, 6),
     "not a number": (lambda r: with_cell(r, 7, 3, "0.1.2"), "not a number", 1, 9),
+    "stamp in other digits": (lambda r: with_cell(r, 3, 0, "\u0663"), "timestamp is not a whole number", 1, 5),
     "Python-only number": (lambda r: with_cell(r, 7, 3, "1_0"), "not a number", 1, 9),
     "short": (lambda r: [*r[:5], "1025000000,0.0", *r[6:]], "row too short", 1, 7),
     "cut off at the end": (lambda r: [*r[:-1], r[-1][:12]], "row too short", 1, 401),
@@ -97,6 +98,9 @@ HARMLESS: dict[str, Callable[[Lines], bytes]] = {
     "header without #": lambda r: "\n".join([IMU_HEADER[1:], *r]).encode(),
     "other header names": lambda r: "\n".join(["#t,wx,wy,wz,ax,ay,az", *r]).encode(),
     "header repeated": lambda r: "\n".join([IMU_HEADER[1:], *r[:50], IMU_HEADER[1:], *r[50:]]).encode(),
+    "stamps as numpy.savetxt writes them": lambda r: "\n".join(
+        [IMU_HEADER, *(f"{float(s.partition(',')[0]):.18e},{s.partition(',')[2]}" for s in r)]
+    ).encode(),
     "stamps written as floats": lambda r: "\n".join([IMU_HEADER, *(s.replace(",", ".0,", 1) for s in r)]).encode(),
 }
 

@@ -63,6 +63,22 @@ ERRORS: dict[str, tuple[Callable[[Path], object], str]] = {
         tof(TOF_YAML, "#timestamp [ns],range [mm]", "1000000000,1500"),
         r"tof0/data.csv: column `range` is in \[mm\], must be in \[m\]; convert the file",
     ),
+    "semicolons": (
+        imu_csv(*(line.replace(",", ";") for line in imu_lines())),
+        r"imu0/data.csv: .* by semicolons, must be",
+    ),
+    "decimal commas": (
+        imu_csv(*(line.replace(",", ";").replace(".", ",") for line in imu_lines())),
+        r"imu0/data.csv: values are separated by semicolons, must be by commas; convert the file",
+    ),
+    "tabs": (
+        imu_csv(*(line.replace(",", "\t") for line in imu_lines())),
+        r"imu0/data.csv: .* by tabs, must be by commas",
+    ),
+    "row numbers first": (
+        imu_csv("," + IMU_HEADER[1:], *(f"{i},{line}" for i, line in enumerate(imu_lines()))),
+        r"imu0/data.csv: the first column must be the timestamp \[ns\], is ``; reorder the file",
+    ),
     "degrees": (
         imu_csv("#timestamp [ns],wx [deg/s],wy,wz,ax,ay,az", "1,0,0,0,0,0,9.8"),
         r"column `wx` is in \[deg/s\], must be in \[rad s\^-1\]",
