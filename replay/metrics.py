@@ -13,7 +13,7 @@ from axialnav.replay.axial import AxialFrame, along, axial_frame, sigma_along
 from axialnav.replay.reference import Matched, match
 from axialnav.replay.sensor_metrics import sensor_metrics
 from axialnav.replay.series import chi_square_mean_band, effective_samples_of_squares
-from axialnav.replay.speed_metrics import NO_SPEED, speed_metrics
+from axialnav.replay.speed_metrics import NO_SPEED, SPEED_KEYS, speed_metrics
 
 if TYPE_CHECKING:
     from axialnav.replay.flight import Flight
@@ -25,10 +25,13 @@ AXIAL_KEYS = ("rmse", "mean_error", "max_abs_error", "min_abs_error", "mean_sigm
 def score(track: Track, log: InnovationLog, flight: Flight, config: Config) -> dict[str, Any]:
     """Everything in ``metrics.json`` that does not depend on the clock on the wall.
 
-    Values that could not be evaluated are None, never 0.  Beyond the contract: ``reference.kind`` (truth, gps, none),
-    ``alignment`` (none or rigid), ``nees_velocity_band`` and ``nees_velocity_samples`` (see :func:`nees`),
-    ``horizontal_speed_rmse_m_s`` and ``gps_latency_s`` for flights that only have GPS, ``resets``, and ``drops``
-    (what the reader refused, by sensor and reason).
+    Values that could not be evaluated are None, never 0.  ``reference.available`` counts the estimates inside the
+    scoring window (for GPS: its samples there), ``reference.used`` those that had a reference.
+
+    Beside the promised keys: ``reference.kind`` (truth, gps, none), ``alignment`` (none or rigid),
+    ``nees_velocity_band`` and ``nees_velocity_samples`` (see :func:`nees`), ``horizontal_speed_rmse_m_s``,
+    ``horizontal_speed_mean_error_m_s`` and ``gps_latency_s`` for flights that only have GPS, ``resets``, ``drops`` (what the reader refused, by sensor and
+    reason) and ``health`` (share of the flight under each condition that is not good).
 
     Parameters
     ----------
@@ -48,7 +51,7 @@ def score(track: Track, log: InnovationLog, flight: Flight, config: Config) -> d
         "reference": _reference(matched, flight, speed),
         "alignment": None if matched is None else ("rigid" if aligned else "none"),
         **_truth_scores(matched, config),
-        **{key: speed[key] for key in ("horizontal_speed_rmse_m_s", "gps_latency_s")},
+        **{key: speed[key] for key in SPEED_KEYS},
         "sensors": sensor_metrics(track, log, flight.tables, config),
         "resets": int(track.resets[-1]) if track.resets.size else 0,
         "drops": [{"sensor": d.sensor, "reason": d.reason, "count": d.count} for d in flight.drops],

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 MAX_TRACK_GAP_NS = 100_000_000
 LATENCIES_S = np.arange(0.0, 0.5001, 0.01)
 MIN_SPEED_CHANGE_M_S = 0.2
-NO_SPEED: dict[str, Any] = {"used": 0, "available": 0, "horizontal_speed_rmse_m_s": None, "gps_latency_s": None}
+SPEED_KEYS = ("horizontal_speed_rmse_m_s", "horizontal_speed_mean_error_m_s", "gps_latency_s")
+NO_SPEED: dict[str, Any] = {"used": 0, "available": 0, **dict.fromkeys(SPEED_KEYS)}
 
 
 def speed_metrics(track: Track, gps: GpsReference, evaluation: tuple[float | None, float | None]) -> dict[str, Any]:
@@ -30,7 +31,8 @@ def speed_metrics(track: Track, gps: GpsReference, evaluation: tuple[float | Non
     Returns
     -------
     dict
-        ``used``, ``available`` (GPS samples in the window), ``horizontal_speed_rmse_m_s``, ``gps_latency_s``.
+        ``used``, ``available`` (GPS samples in the window), ``horizontal_speed_rmse_m_s``,
+        ``horizontal_speed_mean_error_m_s`` (filter minus GPS), ``gps_latency_s``.
     """
     if track.t_ns.size == 0:
         return NO_SPEED
@@ -46,6 +48,7 @@ def speed_metrics(track: Track, gps: GpsReference, evaluation: tuple[float | Non
         "used": int(good.sum()),
         "available": int(t_ns.size),
         "horizontal_speed_rmse_m_s": float(np.sqrt((error[good] ** 2).mean())) if good.any() else None,
+        "horizontal_speed_mean_error_m_s": float(error[good].mean()) if good.any() else None,
         "gps_latency_s": _latency(t_ns, reference, stamps, speed),
     }
 

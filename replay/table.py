@@ -95,7 +95,9 @@ def _scores(run: Run) -> Iterator[str]:
     if kind == "gps":
         speed = _number(metrics["horizontal_speed_rmse_m_s"], ".3f")
         late = _number(metrics["gps_latency_s"], ".2f")
-        yield f"horizontal speed vs GPS   RMS {speed} m/s   GPS late by about {late} s (scored as stamped)   {coverage}"
+        bias = _number(metrics["horizontal_speed_mean_error_m_s"], "+.3f")
+        words = f"RMS {speed} m/s   bias {bias}   GPS late by about {late} s (scored as stamped)"
+        yield f"horizontal speed vs GPS   {words}   {coverage}"
     if metrics["position_rmse_m"] is None:
         scored = "" if kind == "gps" else f"   {coverage}"
         yield f"axial velocity vs reference   {NOT_EVALUATED} ({WHY_NOT[kind]}){scored}"

@@ -14,12 +14,13 @@ from axialnav.replay.report.sections import (
     position,
     provenance,
     settings,
+    speed,
     strip,
     verdict,
 )
 from axialnav.replay.run import Run
 
-SECTIONS = (verdict, axial, strip, innovations, position, biases, settings, provenance)
+SECTIONS = (verdict, axial, speed, strip, innovations, position, biases, settings, provenance)
 TEMPLATES = Path(__file__).parent / "templates"
 
 

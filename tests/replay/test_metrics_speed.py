@@ -8,7 +8,7 @@ import pytest
 from axialnav.replay.flight import GpsReference
 from axialnav.replay.metrics import score
 from axialnav.replay.speed_metrics import speed_metrics
-from tests.replay.made_runs import START_NS, make_config, make_flight, make_log, make_track, true_motion
+from tests.replay.made_runs import START_NS, make_config, make_flight, make_log, make_track, stamps, true_motion
 
 COUNT = 5000
 
@@ -32,6 +32,12 @@ def test_late_gps_is_recognised_and_still_scored_as_stamped() -> None:
     found = speed_metrics(make_track(np.zeros((COUNT, 3))), gps(late_s=0.13), (1.0, 15.0))
     assert found["gps_latency_s"] == pytest.approx(0.13, abs=0.011)
     assert found["horizontal_speed_rmse_m_s"] > 0.03
+
+
+def test_a_speed_that_is_too_large_has_a_positive_bias() -> None:
+    found = speed_metrics(make_track(0.1 * true_motion(stamps(COUNT))[1]), gps(), (1.0, 15.0))
+    speed = np.hypot(gps().velocity_m_s[5:76, 0], gps().velocity_m_s[5:76, 1])
+    assert found["horizontal_speed_mean_error_m_s"] == pytest.approx(0.1 * speed.mean(), rel=1e-3)
 
 
 def test_gps_outside_the_track_is_not_used() -> None:
