@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.readings import Reading
+from axialnav.models.rig import Uwb
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -158,10 +159,18 @@ class Flight:
     drops: tuple[Drop, ...] = ()
 
     def readings(self) -> Iterator[Reading]:
-        """Typed readings of all fusable sensors in time order; ties in the fixed order of the sensors."""
+        """Typed readings of all fusable sensors in time order; ties in the fixed order of the filter."""
         from axialnav.replay.flight_readings import merge_readings
 
         return merge_readings(self)
+
+    def tables_for(self, config: Config) -> dict[str, SensorTable]:
+        """Tables whose anchor columns refer to the anchors of ``config``, which may differ from the flight's own."""
+        tables = dict(self.tables)
+        for name, spec in config.sensor.items():
+            if isinstance(spec, Uwb) and name in tables:
+                tables[name] = tables[name].renumbered(tuple(spec.anchors))
+        return tables
 
     def image_path(self, sensor: str, filename: str) -> Path:
         """Where the image ``filename`` of a camera lies."""

@@ -20,19 +20,20 @@ from axialnav.fusion.readings import (
     UwbTdoa,
     WallRange,
 )
+from axialnav.fusion.sources import fused_sensors
 from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, BlurMeter, Flow, Imu, RangeFinder, Uwb
-from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable
+from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable, Stamps
 
 
 def merge_readings(flight: Flight) -> Iterator[Reading]:
-    """All fusable readings of a flight in time order; ties in the order of ``flight.tables``."""
+    """All fusable readings of a flight in time order; ties in the order in which the filter takes them."""
     makers: list[Callable[[int], Reading]] = []
-    stamps: list[np.ndarray[Any, np.dtype[np.int64]]] = []
-    for name, table in flight.tables.items():
+    stamps: list[Stamps] = []
+    for name in fused_sensors(flight.config):
         kind = reading_class(flight.config.sensor[name])
-        if kind is not None:
-            makers.append(_maker(kind, name, table))
-            stamps.append(table.t_ns)
+        if kind is not None and name in flight.tables:
+            makers.append(_maker(kind, name, flight.tables[name]))
+            stamps.append(flight.tables[name].t_ns)
     if not stamps:
         return
     source = np.repeat(np.arange(len(stamps)), [len(t) for t in stamps])

@@ -132,7 +132,7 @@ def _filter(
     if not any(isinstance(spec, Imu) and len(flight.tables.get(name, ())) for name, spec in config.sensor.items()):
         there = ", ".join(flight.tables) or "nothing"
         raise FlightError(f"flight {flight.name}: no IMU sample to replay, it holds {there}; the filter needs imu0")
-    result = run_batch(config, flight.tables, progress)
+    result = run_batch(config, flight.tables_for(config), progress)
     return result.track, result.log, result.kernel_s
 
 

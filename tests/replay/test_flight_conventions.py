@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
+from axialnav.fusion.config import Config
 from axialnav.fusion.readings import (
     Attitude,
     BlurLength,
@@ -19,6 +21,7 @@ from axialnav.fusion.readings import (
     UwbTdoa,
     WallRange,
 )
+from axialnav.fusion.sources import fused_sensors
 from axialnav.models.rig import BlurMeter, Flow, Gps, RangeFinder, Uwb
 from axialnav.replay.flight import Flight, load_flight
 from tests.replay.flight_texts import FLOW_YAML, SENSORS, TOF_YAML, full_flight, standing_flight, write_sensor
@@ -48,13 +51,13 @@ def test_every_kind_of_sensor_becomes_its_reading(everything: Flight) -> None:
 
 def test_readings_come_in_time_order_ties_by_sensor_and_none_is_lost(everything: Flight) -> None:
     readings = list(everything.readings())
-    order = list(everything.tables)
+    order = fused_sensors(everything.config)
     keys = [(reading.t_ns, order.index(reading.sensor)) for reading in readings]
     assert keys == sorted(keys)
     assert order[0] == "imu0"
-    fusable = [name for name in order if name != "cam0"]
-    assert len(readings) == sum(len(everything.tables[name]) for name in fusable)
-    assert all(len(everything.tables[name]) == math.ceil(2000 / SENSORS[name][1]) for name in fusable)
+    assert set(order) == set(everything.tables) - {"cam0"}
+    assert len(readings) == sum(len(everything.tables[name]) for name in order)
+    assert all(len(everything.tables[name]) == math.ceil(2000 / SENSORS[name][1]) for name in order)
 
 
 def test_readings_equal_the_tables(everything: Flight) -> None:
@@ -135,6 +138,20 @@ def test_flight_toml_fills_the_rig_part_of_the_configuration(everything: Flight)
     assert (config.initial.position_m, config.initial.yaw_rad) == ((1.495, 0.037, 0.03), -0.0027)
     assert config.initial.sigma_yaw_rad == 0.05
     assert everything.evaluation == (0.25, 1.75)
+
+
+def test_a_configuration_with_other_anchors_finds_the_same_rows(everything: Flight) -> None:
+    """The indices follow the list of whoever describes the sensor; names stay with their rows."""
+    spec = everything.config.sensor["uwb1"]
+    assert isinstance(spec, Uwb)
+    backwards = msgspec.structs.replace(spec, anchors=dict(reversed(spec.anchors.items())))
+    config = Config(sensor={**everything.config.sensor, "uwb1": backwards})
+    before, after = everything.tables["uwb1"], everything.tables_for(config)["uwb1"]
+    assert after.anchors == ("11", "9", "7")
+    assert before.columns["anchor_a"][0] == 2
+    assert after.columns["anchor_a"][0] == 0
+    assert after.anchor_names("anchor_b") == before.anchor_names("anchor_b")
+    assert everything.tables_for(everything.config)["uwb1"] is before
 
 
 def test_truth_and_gps_are_references(everything: Flight) -> None:
