@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.alignment import align
 from axialnav.fusion.config import Config
 from axialnav.fusion.events import Events, Table, pack_tables
+from axialnav.fusion.handedness import is_undecided, log_likelihood, mirror_config, mirror_tables, mirror_track
 from axialnav.fusion.kernels.run import run
 from axialnav.fusion.memory import (
     LOG_CODE,
@@ -37,16 +38,21 @@ from axialnav.models.state import E_ATT, E_POS, E_VEL, NOMINAL_SLICES
 
 Array = NDArray[np.float64]
 CHUNKS = 50
+LEFT_HANDED_EVIDENCE = 50.0  # nats by which the mirrored frame must explain the readings better
 
 
 @dataclass(frozen=True, slots=True)
 class BatchResult:
-    """What came out of a recording: the track, a record per reading, and the time spent in the kernel [s]."""
+    """What came out of a recording: the track, a record per reading, and the time spent in the kernel [s].
+
+    ``handedness`` is that of the frame in which the flight was surveyed, as given or as found.
+    """
 
     track: Track
     log: InnovationLog
     kernel_s: float
     events: int
+    handedness: str = "right"
 
 
 def run_batch(
@@ -68,6 +74,22 @@ def run_batch(
     ConfigError, FlightError
         The configuration does not describe a usable rig, or the recording cannot start a filter.
     """
+    if config.handedness == "left":
+        return _run_mirrored(config, tables, progress)
+    result = _run(config, tables, progress)
+    if is_undecided(config):
+        mirrored = _run_mirrored(config, tables, None)
+        if log_likelihood(mirrored.log) > log_likelihood(result.log) + LEFT_HANDED_EVIDENCE:
+            return mirrored
+    return result
+
+
+def _run_mirrored(config: Config, tables: Mapping[str, Table], progress: Callable[[float], None] | None) -> BatchResult:
+    result = _run(mirror_config(config), mirror_tables(tables), progress)
+    return replace(result, track=mirror_track(result.track), handedness="left")
+
+
+def _run(config: Config, tables: Mapping[str, Table], progress: Callable[[float], None] | None) -> BatchResult:
     src, settings = build_sources(config), build_settings(config)
     enabled = {name: table for name, table in tables.items() if name not in config.disabled}
     events = pack_tables(config, enabled)

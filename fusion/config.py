@@ -116,11 +116,13 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     """Noise of UWB readings.
 
     Errors of neighbouring readings are alike over ``correlation_time_s``; a reading that comes every dt is given the
-    variance ``sigma_m^2 (1 + 2 correlation_time_s / dt)``, so that fast receivers are not believed too much.
+    variance ``sigma_m^2 (1 + 2 correlation_time_s / dt)``, so that fast receivers are not believed too much.  Fixes
+    that a receiver computed itself have ``fix_sigma_m``: they are as good as its geometry, which we cannot see.
     """
 
     sigma_m: Positive = 0.15
-    correlation_time_s: NonNegative = 0.015
+    fix_sigma_m: Positive = 1.0
+    correlation_time_s: NonNegative = 0.012
     bias_sigma_m: Positive = 0.002
     bias_time_s: Positive = 10.0
     gate: Gate = Gate()
@@ -129,26 +131,26 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
 class FlowTuning(_Table, frozen=True, kw_only=True):
     """Noise of image motion."""
 
-    sigma_px: Positive = 2.0
+    sigma_px: Positive = 1.8
     scale_sigma: Positive = 0.03
     scale_walk: NonNegative = 1e-4
     min_quality: NonNegative = 1.0
-    gate: Gate = Gate()
+    gate: Gate = Gate(soft_sigma=3.0)
 
 
 class RangeTuning(_Table, frozen=True, kw_only=True):
     """Noise of wall and floor ranges."""
 
-    sigma_m: Positive = 0.03
+    sigma_m: Positive = 0.02
     offset_sigma_m: Positive = 1.0
     offset_walk_m: NonNegative = 1e-3
-    gate: Gate = Gate()
+    gate: Gate = Gate(soft_sigma=3.0)
 
 
 class HeightTuning(_Table, frozen=True, kw_only=True):
-    """Noise of barometric height."""
+    """Noise of barometric height; wide, because indoors air pressure follows doors and propellers, not height."""
 
-    sigma_m: Positive = 0.5
+    sigma_m: Positive = 2.0
     gate: Gate = Gate()
 
 
@@ -170,9 +172,14 @@ class SupervisorTuning(_Table, frozen=True, kw_only=True):
 
 
 class Config(_Table, frozen=True, kw_only=True):
-    """Everything the estimator has to be told.  ``Config()`` is the default for every vehicle."""
+    """Everything the estimator has to be told.  ``Config()`` is the default for every vehicle.
+
+    ``handedness`` tells whether the frame in which anchors and surfaces were surveyed is right-handed.  "auto" decides
+    it in replay where the start is unknown (see :mod:`axialnav.fusion.handedness`) and means "right" elsewhere.
+    """
 
     gravity_m_s2: Annotated[float, msgspec.Meta(gt=0.0, le=30.0)] = 9.80665
+    handedness: Literal["auto", "right", "left"] = "auto"
     corridor: Corridor | None = None
     initial: Initial | None = None
     start: StartTuning = StartTuning()

@@ -169,9 +169,9 @@ def _surface(sensor: str, name: str, config: Config) -> Surface:
 
 def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:
     match spec:
-        case Uwb(sigma_m=sigma):
-            # the receiver's own claim is a floor's business: errors are correlated in time
-            return max(sigma or 0.0, config.uwb.sigma_m), config.uwb.gate
+        case Uwb(sigma_m=claim, measurement=measurement):
+            floor = config.uwb.fix_sigma_m if measurement == "position" else config.uwb.sigma_m
+            return max(claim or 0.0, floor), config.uwb.gate  # receivers claim too little, never too much
         case Flow(sigma_px=sigma):
             return sigma or config.flow.sigma_px, config.flow.gate
         case BlurMeter():

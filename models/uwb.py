@@ -66,7 +66,7 @@ def uwb_tdoa(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor_a: Array,
 
 @kernel
 def uwb_position(x: Array, p_W: Array, R_WB: Array, lever_B: Array, axial: float, axis: int, H: Array) -> float:
-    """Predict coordinate ``axis`` of the antenna [m]; the bias enters by ``axial``, that axis of the corridor's direction."""
+    """Predict coordinate ``axis`` of the antenna [m]; ``axial`` of the bias acts along it."""
     u0, u1, u2 = 0.0, 0.0, 0.0
     if axis == 0:
         u0 = 1.0
