@@ -29,9 +29,9 @@ def score(track: Track, log: InnovationLog, flight: Flight, config: Config) -> d
     scoring window (for GPS: its samples there), ``reference.used`` those that had a reference.
 
     Beside the promised keys: ``reference.kind`` (truth, gps, none), ``alignment`` (none or rigid),
-    ``nees_velocity_band`` and ``nees_velocity_samples`` (see :func:`nees`), ``horizontal_speed_rmse_m_s``,
-    ``horizontal_speed_mean_error_m_s`` and ``gps_latency_s`` for flights that only have GPS, ``resets``, ``drops`` (what the reader refused, by sensor and
-    reason) and ``health`` (share of the flight under each condition that is not good).
+    ``nees_velocity_band`` and ``nees_velocity_samples`` (see :func:`nees`), the keys of
+    :func:`~axialnav.replay.speed_metrics.speed_metrics` for flights that only have GPS, ``resets``, ``drops`` (what the
+    reader refused, by sensor and reason) and ``health`` (share of the flight under each condition that is not good).
 
     Parameters
     ----------

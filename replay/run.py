@@ -16,6 +16,7 @@ from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.fused import Column, digest, fused_columns
 
 ESTIMATORS = ("corridor",)
+MIN_IMU_SAMPLES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +130,14 @@ def _filter(
 ) -> tuple[Track, InnovationLog, float]:
     from axialnav.fusion.batch import run_batch
 
-    if not any(isinstance(spec, Imu) and len(flight.tables.get(name, ())) for name, spec in config.sensor.items()):
+    inertial = [name for name, spec in config.sensor.items() if isinstance(spec, Imu)]
+    samples = max((len(flight.tables.get(name, ())) for name in inertial), default=0)
+    if samples < MIN_IMU_SAMPLES:
         there = ", ".join(flight.tables) or "nothing"
-        raise FlightError(f"flight {flight.name}: no IMU sample to replay, it holds {there}; the filter needs imu0")
+        raise FlightError(
+            f"flight {flight.name}: {samples} IMU samples, at least {MIN_IMU_SAMPLES} are needed to replay; "
+            f"it holds {there}, the filter needs imu0"
+        )
     result = run_batch(config, flight.tables_for(config), progress)
     return result.track, result.log, result.kernel_s
 

@@ -62,4 +62,7 @@ def _latency(t_ns: NDArray[np.int64], reference: Array, stamps: NDArray[np.int64
         error = interpolate(t_ns - int(late_s * 1e9), stamps, speed, MAX_TRACK_GAP_NS)[:, 0] - reference
         good = np.isfinite(error)
         costs.append(float((error[good] ** 2).mean()) if good.any() else np.inf)
-    return float(LATENCIES_S[int(np.argmin(costs))]) if np.isfinite(min(costs)) else None
+    best = int(np.argmin(costs))
+    if best == LATENCIES_S.size - 1 or not np.isfinite(costs[best]):
+        return None  # the fit still improves at the end of the search: the two do not show the same motion
+    return float(LATENCIES_S[best])
