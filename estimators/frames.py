@@ -1,0 +1,107 @@
+"""What may be handed in as frames, and the grey picture that is taken from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.errors import FrameError
+from axialnav.estimators.result import MotionReason
+
+Image = NDArray[np.unsignedinteger[Any]]
+Frames = NDArray[np.generic] | Sequence[NDArray[np.generic]]
+MIN_SIDE_PX = 32
+MAX_SATURATED = 0.2
+DARK_DN = 1
+FULL_DN = 255
+PROBE = 8  # every 8th pixel of every 8th row decides about saturation and darkness
+
+
+def luma(image: NDArray[np.generic]) -> Image:
+    """Grey picture (h, w) of a grey (h, w), BGR (h, w, 3) or YUYV (h, w, 2) picture; a view where possible.
+
+    BGR is reduced to its green channel: the sharpest one of a Bayer sensor, and a view instead of a pass over all
+    pixels. YUYV holds its luma in channel 0.
+
+    Raises
+    ------
+    FrameError
+        If the picture is not uint8 or uint16, has another shape, or is smaller than 32 x 32.
+    """
+    if not isinstance(image, np.ndarray):
+        raise FrameError(f"a frame must be a numpy array, got {type(image).__name__}; decode it first")
+    if image.dtype not in (np.uint8, np.uint16):
+        raise FrameError(f"a frame must be uint8 or uint16, got {image.dtype}; hand in the camera's own numbers")
+    if image.ndim == 3 and image.shape[2] in (1, 2, 3):
+        image = image[:, :, 1 if image.shape[2] == 3 else 0]
+    if image.ndim != 2 or min(image.shape) < MIN_SIDE_PX:
+        raise FrameError(
+            f"a frame must be (h, w) grey, (h, w, 3) BGR or (h, w, 2) YUYV with sides of at least {MIN_SIDE_PX} px, "
+            f"got shape {image.shape}"
+        )
+    return cast(Image, image)
+
+
+def frame_stack(frames: Frames, axis: str, least: int) -> list[Image]:
+    """Grey frames of one shape with the axis of motion along the rows.
+
+    Parameters
+    ----------
+    frames
+        (N, h, w) or a sequence of frames.
+    axis
+        ``"x"`` (along the rows) or ``"y"`` (down the columns).
+    least
+        Smallest usable N.
+
+    Raises
+    ------
+    FrameError
+        If there are too few frames, their shapes or types differ, or the axis has another name.
+    """
+    if axis not in ("x", "y"):
+        raise FrameError(f"axis must be 'x' (along the rows) or 'y' (down the columns), got {axis!r}")
+    if len(frames) < least:
+        raise FrameError(f"this method needs at least {least} frames, got {len(frames)}; collect more before asking")
+    stack = [luma(frame) for frame in frames]
+    kinds = {(frame.shape, frame.dtype.name) for frame in stack}
+    if len(kinds) != 1:
+        raise FrameError(f"all frames must have one size and one type, got {sorted(map(str, kinds))}")
+    return stack if axis == "x" else [np.ascontiguousarray(frame.T) for frame in stack]
+
+
+def check_times(frame_period_s: float, exposure_s: float | None) -> None:
+    """Refuse a frame period or an exposure that cannot be.
+
+    Raises
+    ------
+    FrameError
+        If the period is not positive and finite, or the exposure not within 0 and the period.
+    """
+    if not 0.0 < frame_period_s < math.inf:
+        raise FrameError(f"frame_period_s must be positive and finite, got {frame_period_s!r}")
+    if exposure_s is not None and not 0.0 <= exposure_s <= frame_period_s * 1.001:
+        raise FrameError(
+            f"exposure_s must lie within 0 and the frame period of {frame_period_s:.6g} s, got {exposure_s!r}; "
+            "pass None if it is unknown"
+        )
+
+
+def unusable(image: Image) -> str:
+    """Why one picture cannot hold a displacement (black, saturated, constant); "" if it can.
+
+    A sensor of any depth saturates at a number of the form 2^n - 1.
+    """
+    probe = image[::PROBE, ::PROBE]
+    top = int(probe.max())
+    if top <= DARK_DN and int(image.max()) <= DARK_DN:
+        return MotionReason.DARK
+    if top >= FULL_DN and top & (top + 1) == 0 and float(np.mean(probe == top)) > MAX_SATURATED:
+        return MotionReason.SATURATED
+    if int(probe.min()) == top and int(image.min()) == int(image.max()):
+        return MotionReason.NO_TEXTURE
+    return ""

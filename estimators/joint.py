@@ -1,0 +1,152 @@
+r"""Joint maximum likelihood: one displacement from all frames at once.
+
+The frames show one wall, shifted by ``k d``.  Search by inverse transforms of the lag sums (:mod:`.search`), then
+windows that follow the wall, then Newton steps on the exact likelihood (:mod:`.positions`) with smooth weights
+(:mod:`.texture`).  Learning the common picture from all frames is what lets it reach the Cramer-Rao bound, which
+shifting one frame onto another cannot.
+
+Source: likelihood and bound as in Robinson and Milanfar, IEEE Trans. Image Process. 13(9), 2004, and Aguerrebere et
+al., arXiv 1602.01541 (2016), for N frames on a line.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.positions import coherent_power, motion_basis, position_scores
+from axialnav.estimators.spectrum import pair_count
+from axialnav.estimators.texture import blur_power, matched_weight, shape_family, smooth_noise, texture_power
+from axialnav.estimators.window import Products
+
+Array = NDArray[np.float64]
+MAX_STEP_PX = 0.3
+STEPS = 4
+TOLERANCE_PX = 1e-4
+PRIOR_DOF = 6.0
+WINDOW_VARIANCE = 1.6
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result of the Newton steps for one set of strips.
+
+    Parameters
+    ----------
+    motion
+        Displacement per frame [px], and its change per frame if it was fitted, shape (1 or 2,).
+    covariance
+        Of ``motion``, from the spread of the strips, shape like ``(m, m)``.
+    score, information
+        Of the frames' positions, per strip, shapes (s, n) and (s, n, n), at ``motion``.
+    coherence
+        ``sum_f w Re E`` per strip and pair, shape (s, p).
+    texture, noise, weight
+        Power per row and frame, and the weights used, shape (f,).
+    """
+
+    motion: Array
+    covariance: Array
+    score: Array
+    information: Array
+    coherence: Array
+    texture: Array
+    noise: Array
+    weight: Array
+
+
+def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[Array, Array]:
+    """Smooth texture and noise power per row and frame, shape (f,), from the coherent part at these positions."""
+    frames, rows = products.frames, float(products.rows.sum())
+    omega = 2.0 * np.pi * products.band.frequency()
+    mean_power = products.power.sum(axis=0) / (frames * rows)
+    pairs = np.empty(products.band.count)
+    coherent_power(products.re.sum(axis=0), products.im.sum(axis=0), omega, position_px, pairs)
+    coherent = mean_power / frames + 2.0 * pairs / (frames**2 * rows)
+    incoherent = (mean_power - coherent) * frames / (frames - 1)
+    noise = smooth_noise(incoherent, 1e-3 * float(mean_power.mean()) + 1e-12)
+    band = products.band
+    shapes = shape_family(band.first, band.count, band.length) * blur_power(blur_px, band.frequency())
+    return texture_power(coherent, noise / frames, int(rows), shapes), noise
+
+
+def evaluate(products: Products, position_px: Array, weight: Array) -> tuple[Array, Array, Array]:
+    """Score (s, n), information (s, n, n) and coherence (s, p) of every strip at these positions."""
+    strips, frames = products.re.shape[0], products.frames
+    score, information = np.empty((strips, frames)), np.empty((strips, frames, frames))
+    coherence = np.empty((strips, pair_count(frames)))
+    omega = 2.0 * np.pi * products.band.frequency()
+    position_scores(products.re, products.im, omega, weight, position_px, score, information, coherence)
+    return score, information, coherence
+
+
+def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: int = 2) -> Fit | None:
+    """Maximise the likelihood of a displacement (and its change, if ``start`` has two numbers).
+
+    Parameters
+    ----------
+    products
+        Products of windows that follow the wall, the strips to be used.
+    start
+        Displacement per frame [px] (and its change), within half a pixel of the answer, shape (1 or 2,).
+    exposure_ratio
+        Exposure over frame period; 0 where it is unknown (it only shapes the weights).
+    passes
+        How often the weights are computed anew.
+
+    Returns
+    -------
+    Fit or None
+        None if the likelihood has no maximum there.
+    """
+    basis = motion_basis(products.frames, len(start) == 2)
+    motion = np.array(start, dtype=np.float64)
+    for _ in range(passes):
+        position = basis @ motion - products.offset_px
+        texture, noise = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
+        weight = matched_weight(texture, noise, products.frames)
+        for _ in range(STEPS):
+            score, information, coherence = evaluate(products, basis @ motion - products.offset_px, weight)
+            J = basis.T @ information.sum(axis=0) @ basis
+            if not (np.all(np.isfinite(J)) and float(np.linalg.eigvalsh(J)[0]) > 0.0):
+                return None
+            step = np.linalg.solve(J, basis.T @ score.sum(axis=0))
+            step *= min(1.0, MAX_STEP_PX / max(float(np.abs(step).max()), 1e-12))
+            motion += step
+            if float(np.abs(step).max()) < TOLERANCE_PX:
+                break
+    covariance = sandwich(score @ basis, J)
+    return Fit(motion, covariance, score, information, coherence, texture, noise, weight)
+
+
+def sandwich(score: Array, J: Array) -> Array:
+    r"""Covariance of the parameters from the spread of the strips' scores.
+
+    .. math:: J^{-1} \, \frac{\nu M + \nu_0 \, \gamma J}{\nu + \nu_0} \, J^{-1}, \qquad
+        M = \frac{S}{S - 1} \sum_s (g_s - \bar g)(g_s - \bar g)^T
+
+    with :math:`\nu = S - 1`, shrunk with :math:`\nu_0` pseudo degrees of freedom towards the model's own information
+    times the loss :math:`\gamma` of the window.
+
+    Parameters
+    ----------
+    score
+        Of every strip, shape (s, m).
+    J
+        Information, shape (m, m).
+    """
+    strips = score.shape[0]
+    spread = score - score.mean(axis=0)
+    meat = spread.T @ spread * strips / max(strips - 1, 1)
+    free = strips - 1
+    middle = (free * meat + PRIOR_DOF * WINDOW_VARIANCE * J) / (free + PRIOR_DOF)
+    inverse = np.linalg.inv(J)
+    return np.asarray(inverse @ middle @ inverse)
+
+
+def sigma_of(fit: Fit) -> float:
+    """Standard deviation of the displacement [px]."""
+    return math.sqrt(float(fit.covariance[0, 0]))

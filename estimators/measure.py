@@ -1,0 +1,127 @@
+"""The joint estimate from a full window of frames: search, follow, solve, doubt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.integrity import Choice, choose
+from axialnav.estimators.joint import Fit, fit_motion, sigma_of
+from axialnav.estimators.result import MotionEstimate, MotionReason, refused
+from axialnav.estimators.search import STEP_PX, Profiles, lag_sums, profiles, unrelated_spread
+from axialnav.estimators.texture import matched_weight, shape_family, texture_power
+from axialnav.estimators.window import FrameWindow, Products
+
+Array = NDArray[np.float64]
+BANDS = 5
+ENOUGH_BANDS = 3
+MAX_OUTSIDE_MASS = 0.01
+MIN_SIGNIFICANCE = 6.0
+MAX_SIGMA_PX = 0.3
+PRIOR_SIGMAS = 5.0
+PRIOR_MARGIN_PX = 1.0
+NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold noise alone, to first order
+
+
+@dataclass(frozen=True)
+class JointOptions:
+    """What the joint estimate is told, and which of its doubts are switched on.
+
+    Parameters
+    ----------
+    frame_period_s, exposure_s
+        Period and exposure [s]; the exposure may be unknown (None).
+    prior_px
+        Expected displacement per frame and its standard deviation [px]; narrows the search and nothing else, so that a
+        filter may pass its own prediction without counting it twice.
+    consensus
+        Ask the row bands one by one.
+    """
+
+    frame_period_s: float
+    exposure_s: float | None = None
+    prior_px: tuple[float, float] | None = None
+    consensus: bool = True
+
+    @property
+    def exposure_ratio(self) -> float:
+        """Exposure over period, 0 where it is unknown."""
+        return (self.exposure_s or 0.0) / self.frame_period_s
+
+
+def search_grid(width: int, frames: int, prior_px: tuple[float, float] | None) -> Array:
+    """Displacements to look at [px]: as far as half of the content stays in view, or around the prior."""
+    reach = min(width / 4.0, width / (2.0 * (frames - 1)))
+    low, high = -reach, reach
+    if prior_px is not None:
+        margin = PRIOR_SIGMAS * prior_px[1] + PRIOR_MARGIN_PX
+        low, high = max(low, prior_px[0] - margin), min(high, prior_px[0] + margin)
+    steps = np.arange(math.floor(low / STEP_PX), math.ceil(high / STEP_PX) + 1)
+    return np.asarray(steps * STEP_PX, dtype=np.float64)
+
+
+def search(products: Products, grid_px: Array) -> Profiles:
+    """Profiles of all bands from fixed windows."""
+    frames, rows = products.frames, float(products.rows.sum())
+    power = products.power.sum(axis=0) / (frames * rows)
+    level = float(power[int(NOISE_SHARE * len(power)) :].mean()) + 1e-12
+    noise = np.full_like(power, level)
+    band = products.band
+    shapes = shape_family(band.first, band.count, band.length)
+    weight = matched_weight(texture_power(power, noise, int(rows * frames), shapes), noise, frames)
+    spread = unrelated_spread(products.power, weight, frames, products.rows)
+    return profiles(lag_sums(products.re, products.im, frames), weight, band, grid_px, spread)
+
+
+def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
+    """Estimate the displacement of the frames in the window.
+
+    Parameters
+    ----------
+    window
+        At least two frames.
+    options
+        See :class:`JointOptions`.
+    """
+    frames = len(window.order)
+    span_s = (frames - 1) * options.frame_period_s
+
+    def refuse(reason: str, bands: tuple[int, int] = (0, 0)) -> MotionEstimate:
+        return refused(reason, signed=True, window_s=span_s, method="joint", bands=bands)
+
+    grid = search_grid(window.band.length, frames, options.prior_px)
+    found = search(window.fixed().grouped(BANDS), grid)
+    choice = choose(found, options.consensus)
+    asked = (int(choice.agree.sum()), BANDS)
+    reason = doubt_search(found, choice, options)
+    if reason:
+        return refuse(reason, asked)
+    fit = _follow(window, float(grid[choice.index]), choice, options)
+    if fit is None:
+        return refuse(MotionReason.AMBIGUOUS, asked)
+    sigma = sigma_of(fit)
+    if not sigma <= MAX_SIGMA_PX:
+        return refuse(MotionReason.SIGMA, asked)
+    return MotionEstimate(float(fit.motion[0]), sigma, math.nan, True, MotionReason.GOOD, True, span_s, bands=asked)
+
+
+def _follow(window: FrameWindow, start_px: float, choice: Choice, options: JointOptions) -> Fit | None:
+    strips = np.repeat(choice.agree, len(window.edges[1:]) // BANDS)
+    products = window.following(start_px).selected(strips)
+    return fit_motion(products, np.array([start_px]), options.exposure_ratio)
+
+
+def doubt_search(found: Profiles, choice: Choice, options: JointOptions) -> str:
+    """Why the search alone already refuses; "" if it does not."""
+    if int(choice.agree.sum()) < ENOUGH_BANDS:
+        return MotionReason.BANDS
+    if found.significance(choice.index, choice.agree) < MIN_SIGNIFICANCE:
+        return MotionReason.AMBIGUOUS
+    if found.outside_mass(choice.index, choice.agree) > MAX_OUTSIDE_MASS:
+        return MotionReason.AMBIGUOUS
+    if options.prior_px is not None and choice.index in (0, len(found.grid_px) - 1):
+        return MotionReason.PRIOR_BORDER
+    return ""

@@ -1,0 +1,101 @@
+"""Rows summed into bins, columns into transposed bins, and windows: the passes over all pixels.
+
+Rows are summed before anything else, in integers, because it divides the work by the bin height and costs little: the
+motion is along the rows.  The mean over all rows is taken off every column: it is where columns of the sensor, dirt and
+upright objects fixed to the camera live, and a wall that moves leaves almost nothing of itself there.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.models.jit import kernel
+
+Plane = NDArray[np.float32]
+TARGET_ROWS = 135
+
+
+def bin_height(height: int) -> int:
+    """Rows summed into one bin, for about 135 bins."""
+    return max(1, round(height / TARGET_ROWS))
+
+
+@kernel
+def bin_rows(frame: NDArray[np.uint8], first_row: int, height: int, out: Plane) -> None:
+    """Sum ``height`` rows into each row of ``out`` (r, w), starting at ``first_row``; then take off column means.
+
+    Rows outside the frame repeat its first or last row.
+    """
+    rows, columns = out.shape
+    last = frame.shape[0] - 1
+    sums = np.empty(columns, dtype=np.uint32)
+    total = np.zeros(columns, dtype=np.float32)
+    for r in range(rows):
+        sums[:] = 0
+        for k in range(height):
+            row = min(max(first_row + r * height + k, 0), last)
+            line = frame[row]
+            for c in range(columns):
+                sums[c] += np.uint32(line[c])
+        for c in range(columns):
+            out[r, c] = np.float32(sums[c])
+            total[c] += out[r, c]
+    for c in range(columns):
+        total[c] /= np.float32(rows)
+    for r in range(rows):
+        for c in range(columns):
+            out[r, c] -= total[c]
+
+
+@kernel
+def bin_columns(frame: NDArray[np.uint8], first_column: int, width: int, step: int, out: Plane) -> None:
+    """Sum ``width`` columns, every ``step`` columns, into the rows of ``out`` (c, h): a transposed, binned frame."""
+    count, height = out.shape
+    last = frame.shape[1] - 1
+    for r in range(height):
+        line = frame[r]
+        for c in range(count):
+            total = np.uint32(0)
+            for k in range(width):
+                total += np.uint32(line[min(max(first_column + c * step + k, 0), last)])
+            out[c, r] = np.float32(total)
+    for c in range(count):
+        mean = np.float32(0.0)
+        for r in range(height):
+            mean += out[c, r]
+        mean /= np.float32(height)
+        for r in range(height):
+            out[c, r] -= mean
+
+
+@kernel
+def apply_window(rows: Plane, start: int, window: Plane, out: Plane) -> None:
+    """``out = rows[:, start : start + len(window)] * window``."""
+    for r in range(rows.shape[0]):
+        for c in range(window.shape[0]):
+            out[r, c] = rows[r, start + c] * window[c]
+
+
+def tukey(length: int, share: float = 0.25) -> Plane:
+    """Window (length,) with cosine flanks over ``share`` of it."""
+    flank = int(share * (length - 1) / 2)
+    window = np.ones(length, dtype=np.float32)
+    rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(flank + 1) / flank))
+    window[: flank + 1] = rise
+    window[-flank - 1 :] = rise[::-1]
+    return window
+
+
+def hann(length: int) -> Plane:
+    """Hann window (length,)."""
+    return np.hanning(length).astype(np.float32)
+
+
+def fast_length(length: int) -> int:
+    """Longest even length <= ``length`` with a fast Fourier transform."""
+    length -= length % 2
+    while cv2.getOptimalDFTSize(length) != length:
+        length -= 2
+    return length

@@ -1,0 +1,115 @@
+"""Row spectra, and the products of spectra that hold everything the frames say about the motion.
+
+For rows ``r`` and frames ``k`` the model is ``Y_rk(w) = S_r(w) exp(-i w x_k) + n`` with the positions ``x_k`` of the
+wall's content.  The likelihood needs only the sums over rows of ``Y_i conj(Y_j)``, one complex number per pair of
+frames and frequency; they are kept for groups of rows (strips), whose spread gives sigma and whose quarrels give away
+what does not move with the wall.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.models.jit import kernel
+
+Plane = NDArray[np.float32]
+Array = NDArray[np.float64]
+FIRST_BIN = 4  # below: lamps and vignettes
+LAST_FREQUENCY = 0.42  # cycles per pixel; above: aliasing
+
+
+@dataclass(frozen=True)
+class Band:
+    """The frequencies in use for windows of one length.
+
+    Parameters
+    ----------
+    length
+        Window length [px].
+    """
+
+    length: int
+
+    @property
+    def first(self) -> int:
+        """First bin."""
+        return FIRST_BIN
+
+    @property
+    def last(self) -> int:
+        """One past the last bin."""
+        return max(FIRST_BIN + 4, int(self.length * LAST_FREQUENCY))
+
+    @property
+    def count(self) -> int:
+        """Number of bins."""
+        return self.last - self.first
+
+    def frequency(self) -> Array:
+        """Frequencies [cycles/px], shape (count,)."""
+        return np.arange(self.first, self.last, dtype=np.float64) / self.length
+
+
+def pair_count(frames: int) -> int:
+    """Number of pairs i < j of ``frames`` frames."""
+    return frames * (frames - 1) // 2
+
+
+def pair_frames(frames: int) -> NDArray[np.int64]:
+    """Frames i and j of every pair in the order of the pair axis, shape (pairs, 2)."""
+    return np.array([(i, j) for i in range(frames) for j in range(i + 1, frames)], dtype=np.int64).reshape(-1, 2)
+
+
+def row_spectra(windowed: Plane, band: Band, packed: Plane, re: Plane, im: Plane) -> None:
+    """Fourier transform of every row, the bins of ``band`` into ``re`` and ``im`` (r, count)."""
+    cv2.dft(windowed, packed, flags=cv2.DFT_ROWS)
+    _unpack(packed, band.first, re, im)
+
+
+@kernel
+def _unpack(packed: Plane, first: int, re: Plane, im: Plane) -> None:
+    for r in range(re.shape[0]):
+        line = packed[r]
+        for f in range(re.shape[1]):
+            re[r, f] = line[2 * (first + f) - 1]
+            im[r, f] = line[2 * (first + f)]
+
+
+@kernel
+def pair_products(
+    re_i: Plane, im_i: Plane, re_j: Plane, im_j: Plane, edges: NDArray[np.int64], out_re: Plane, out_im: Plane
+) -> None:
+    """Sums of ``Y_i conj(Y_j)`` over the rows of every strip.
+
+    Spectra (r, f) as planes; ``edges`` (s + 1,) first row of every strip; outputs (s, f).
+    """
+    for s in range(edges.shape[0] - 1):
+        acc_re, acc_im = out_re[s], out_im[s]
+        acc_re[:] = np.float32(0.0)
+        acc_im[:] = np.float32(0.0)
+        for r in range(edges[s], edges[s + 1]):
+            a, b, c, d = re_i[r], im_i[r], re_j[r], im_j[r]
+            for f in range(a.shape[0]):
+                acc_re[f] += a[f] * c[f] + b[f] * d[f]
+                acc_im[f] += b[f] * c[f] - a[f] * d[f]
+
+
+@kernel
+def power(re: Plane, im: Plane, edges: NDArray[np.int64], out: Plane) -> None:
+    """Sums of ``|Y|^2`` over the rows of every strip, shape (s, f)."""
+    for s in range(edges.shape[0] - 1):
+        acc = out[s]
+        acc[:] = np.float32(0.0)
+        for r in range(edges[s], edges[s + 1]):
+            a, b = re[r], im[r]
+            for f in range(a.shape[0]):
+                acc[f] += a[f] * a[f] + b[f] * b[f]
+
+
+def strip_edges(rows: int, strips: int) -> NDArray[np.int64]:
+    """First row of every strip and the end, shape (strips + 1,)."""
+    return np.linspace(0, rows, strips + 1).astype(np.int64)

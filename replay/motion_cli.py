@@ -1,0 +1,79 @@
+"""The verb ``motion``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from axialnav.fusion.errors import ConfigError, FlightError
+from axialnav.replay.cli_output import emit, progress_bar
+
+NOT_EVALUATED = 3
+
+
+def motion_command(
+    flight: Path,
+    /,
+    *,
+    method: str = "joint",
+    frames: int = 5,
+    camera: str = "cam0",
+    axis: str = "x",
+    distance_m: float | None = None,
+    undistort: Annotated[bool | None, Parameter(negative="--raw")] = None,
+    out: Path | None = None,
+) -> int:
+    """Measure image motion in the frames of a flight and score it against the truth.
+
+    Exit code 3 means that no window was accepted.
+
+    Parameters
+    ----------
+    flight
+        Flight folder with camera frames.
+    method
+        joint (default), composite, single, or a published baseline: stripes, darkline, dct, cepstrum.
+    frames
+        Frames per window.
+    camera
+        Camera folder.
+    axis
+        Image axis of the motion: x or y.
+    distance_m
+        Distance of the wall along the optical axis in metres, for the score; from the surface that the camera names
+        if not given.
+    undistort
+        Remove the lens' distortion first; by default only if the camera names a surface. --raw: use the pixels as
+        recorded.
+    out
+        CSV file to write, one line per window.
+    """
+    from axialnav.estimators.estimate import FrameError
+    from axialnav.replay.flight import load_flight
+    from axialnav.replay.motion import run_motion
+    from axialnav.replay.motion_table import motion_summary
+
+    recording = load_flight(flight)
+    try:
+        with progress_bar(f"motion {recording.name}") as progress:
+            run = run_motion(
+                recording, camera=camera, method=method, frames=frames, axis=axis, distance_m=distance_m,
+                undistort=undistort, progress=progress,
+            )  # fmt: skip
+    except FrameError as error:
+        raise _sorted_error(error) from error
+    if out is not None:
+        out.write_text(run.to_csv(), encoding="utf-8")
+    emit(motion_summary(run))
+    return 0 if run.accepted().any() else NOT_EVALUATED
+
+
+def _sorted_error(error: ValueError) -> ConfigError | FlightError:
+    """A wrong option is a usage error; a frame that cannot be used is a fault of the recording."""
+    text = str(error)
+    words = ("method", "axis", "roi", "distortion model")
+    return (
+        ConfigError(text) if any(text.startswith(word) or f"no {word}" in text for word in words) else FlightError(text)
+    )
