@@ -9,6 +9,9 @@ def main() -> int:
     """Run the command line and return its exit code; one line on stderr where the ``replay`` extra is missing."""
     try:
         from axialnav.replay import cli
+    except KeyboardInterrupt:
+        print("axialnav: interrupted", file=sys.stderr)
+        return 130
     except ModuleNotFoundError as missing:
         if missing.name is None or missing.name.partition(".")[0] == "axialnav":
             raise

@@ -21,6 +21,7 @@ from cyclopts.exceptions import CycloptsError
 from axialnav.fusion.errors import AxialnavError, ConfigError
 from axialnav.replay.cli_output import complain, emit
 from axialnav.replay.cli_replay import demo, replay
+from axialnav.replay.motion_cli import motion_command
 
 PASSED, FAILED, USAGE, UNUSABLE, INTERRUPTED = 0, 1, 2, 3, 130
 DEBUG = "AXIALNAV_DEBUG"
@@ -46,8 +47,8 @@ def build_app() -> App:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    for verb in (demo, replay):
-        app.command(verb)
+    for name, verb in (("demo", demo), ("replay", replay), ("motion", motion_command)):
+        app.command(verb, name=name)
     return app
 
 

@@ -22,6 +22,16 @@ def lag1_autocorrelation(values: Array) -> float | None:
     return float(centred[1:] @ centred[:-1]) / power if power > 0.0 else None
 
 
+def autocorrelation(values: Array) -> Array:
+    """Biased sample autocorrelation of a series about its mean, lags 0 .. n - 1.
+
+    values : (n,) finite numbers, not all equal.
+    """
+    sums = _autocovariance_sums((values - values.mean())[:, None])[:, 0]
+    normalised: Array = sums / sums[0]
+    return normalised
+
+
 def _autocovariance_sums(values: Array) -> Array:
     """``sum_t v_t v_(t+k)`` of each column for the lags k = 0 .. n - 1, by FFT; (n, m) -> (n, m)."""
     count = values.shape[0]

@@ -17,10 +17,11 @@ from axialnav.replay.report.sections import (
     speed,
     strip,
     verdict,
+    whiteness,
 )
 from axialnav.replay.run import Run
 
-SECTIONS = (verdict, axial, speed, strip, innovations, position, biases, settings, provenance)
+SECTIONS = (verdict, axial, speed, strip, innovations, whiteness, position, biases, settings, provenance)
 TEMPLATES = Path(__file__).parent / "templates"
 
 

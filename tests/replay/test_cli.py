@@ -27,7 +27,7 @@ def test_help_names_the_verbs_and_the_exit_codes() -> None:
     done = axialnav("--help")
     assert done.returncode == 0
     assert done.stderr == ""
-    for word in ("replay", "demo", "2 usage error"):
+    for word in ("replay", "demo", "motion", "2 usage error"):
         assert word in done.stdout
 
 

@@ -40,6 +40,11 @@ def test_a_speed_that_is_too_large_has_a_positive_bias() -> None:
     assert found["horizontal_speed_mean_error_m_s"] == pytest.approx(0.1 * speed.mean(), rel=1e-3)
 
 
+def test_a_latency_beyond_the_search_is_not_made_up() -> None:
+    track = make_track(np.zeros((COUNT, 3)))
+    assert speed_metrics(track, gps(late_s=0.9), (1.0, 15.0))["gps_latency_s"] is None
+
+
 def test_gps_outside_the_track_is_not_used() -> None:
     track = make_track(np.zeros((2000, 3)))
     found = speed_metrics(track, gps(), (None, None))

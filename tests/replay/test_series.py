@@ -7,7 +7,12 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from axialnav.replay.series import chi_square_mean_band, effective_samples_of_squares, lag1_autocorrelation
+from axialnav.replay.series import (
+    autocorrelation,
+    chi_square_mean_band,
+    effective_samples_of_squares,
+    lag1_autocorrelation,
+)
 
 
 def autoregressive(keep: float, count: int, rng: np.random.Generator, columns: int = 3) -> np.ndarray:
@@ -25,6 +30,14 @@ def test_lag1_of_a_first_order_series_is_its_memory(keep: float) -> None:
 def test_lag1_of_too_little_or_of_a_constant_is_unknown() -> None:
     assert lag1_autocorrelation(np.array([1.0, 2.0])) is None
     assert lag1_autocorrelation(np.ones(10)) is None
+
+
+def test_autocorrelation_is_the_textbook_sum() -> None:
+    values = autoregressive(0.7, 300, np.random.default_rng(6), columns=1)[:, 0]
+    centred = values - values.mean()
+    expected = [centred[: 300 - k] @ centred[k:] / (centred @ centred) for k in range(300)]
+    np.testing.assert_allclose(autocorrelation(values), expected, atol=1e-12)
+    assert autocorrelation(values)[1] == pytest.approx(lag1_autocorrelation(values))
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.9, 0.98])
