@@ -14,6 +14,7 @@ from axialnav.fusion.config import Config
 from axialnav.fusion.events import Events, Table, pack_tables
 from axialnav.fusion.handedness import is_undecided, log_likelihood, mirror_config, mirror_tables, mirror_track
 from axialnav.fusion.kernels.run import run
+from axialnav.fusion.kernels.update import MIN_WEIGHT
 from axialnav.fusion.memory import (
     LOG_CODE,
     LOG_GATE,
@@ -152,7 +153,7 @@ def unpack_log(config: Config, events: Events, keep: NDArray[np.bool_], rows: Ar
     """Name the columns of log rows and translate codes to verdicts and reasons."""
     rows, code = rows[keep], rows[keep][:, LOG_CODE].astype(np.int64)
     dof = np.maximum(code, 0)
-    fused = rows[:, LOG_WEIGHT] > 0.0
+    fused = rows[:, LOG_WEIGHT] > MIN_WEIGHT
     reason = np.where(code < 0, -code, np.where(fused, int(Reason.NONE), int(Reason.INNOVATION)))
     table = np.array([int(verdict_of(r)) for r in Reason])
     verdict = np.where(fused, int(Verdict.FUSED), table[reason])

@@ -108,7 +108,7 @@ class ImuFault(_Table, frozen=True, kw_only=True):
     doubt_m_s2: Positive = 0.4
     doubt_time_s: Positive = 0.5
     trial_s: Positive = 2.0
-    evidence: Positive = 15.0
+    evidence: Positive = 40.0
     trials_to_clear: Annotated[int, msgspec.Meta(ge=1)] = 5
 
 
@@ -125,7 +125,7 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     correlation_time_s: NonNegative = 0.012
     bias_sigma_m: Positive = 0.002
     bias_time_s: Positive = 10.0
-    gate: Gate = Gate()
+    gate: Gate = Gate(soft_sigma=2.5)
 
 
 class FlowTuning(_Table, frozen=True, kw_only=True):
@@ -141,7 +141,7 @@ class FlowTuning(_Table, frozen=True, kw_only=True):
 class RangeTuning(_Table, frozen=True, kw_only=True):
     """Noise of wall and floor ranges."""
 
-    sigma_m: Positive = 0.02
+    sigma_m: Positive = 0.015
     offset_sigma_m: Positive = 1.0
     offset_walk_m: NonNegative = 1e-3
     gate: Gate = Gate(soft_sigma=3.0)
@@ -159,6 +159,12 @@ class AttitudeTuning(_Table, frozen=True, kw_only=True):
 
     sigma_rad: Positive = 0.05
     gate: Gate = Gate()
+
+
+class DelayTuning(_Table, frozen=True, kw_only=True):
+    """How late a reading may come and still be fused at its own stamp."""
+
+    buffer_s: Annotated[float, msgspec.Meta(gt=0.0, le=10.0)] = 1.0
 
 
 class SupervisorTuning(_Table, frozen=True, kw_only=True):
@@ -191,6 +197,7 @@ class Config(_Table, frozen=True, kw_only=True):
     height: HeightTuning = HeightTuning()
     attitude: AttitudeTuning = AttitudeTuning()
     supervisor: SupervisorTuning = SupervisorTuning()
+    delay: DelayTuning = DelayTuning()
     disabled: tuple[str, ...] = ()
     surface: dict[str, Surface] = {}
     sensor: dict[str, AnySensor] = {}

@@ -20,7 +20,7 @@ NaN stands for "not given".
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +62,17 @@ class Events(NamedTuple):
     values: NDArray[np.float64]
 
 
+def tie_break(values: NDArray[np.float64]) -> tuple[Any, Any, Any]:
+    """Key that orders events of equal stamp and source by their first three values (NaN last).
+
+    Works on one event (8,) or on columns (8, n); makes the order of processing independent of the order of arrival.
+    """
+    first = np.where(np.isnan(values[:3]), np.inf, values[:3])
+    return (first[0], first[1], first[2])
+
+
 def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
-    """Merge the tables of all fused sensors into one batch, sorted by stamp, then by the fixed order of sources."""
+    """Merge the tables of all fused sensors into one batch, sorted by stamp, then source, then value."""
     stamps, sources, values = [], [], []
     for index, name in enumerate(fused_sensors(config)):
         if name not in tables:
@@ -77,7 +86,8 @@ def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
     if not stamps:
         return Events(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WIDTH)))
     t_ns, source, value = np.concatenate(stamps), np.concatenate(sources), np.concatenate(values)
-    order = np.lexsort((source, t_ns))
+    ties = tie_break(value.T)
+    order = np.lexsort((ties[2], ties[1], ties[0], source, t_ns))
     return Events(t_ns[order], source[order], np.ascontiguousarray(value[order]))
 
 

@@ -52,7 +52,7 @@ REASONS: dict[Reason, str] = {
     Reason.SUPERVISOR: "the supervisor holds the source suspect",
     Reason.NOT_ALIGNED: "the filter has no attitude yet",
     Reason.UNKNOWN_ANCHOR: "the anchor is not in the sensor's list",
-    Reason.ALIGNING: "used for the first position, not as an update",
+    Reason.ALIGNING: "held until the first state is known, then processed",
     Reason.DISABLED: "the source is switched off",
 }
 
@@ -192,7 +192,7 @@ def verdict_of(reason: Reason) -> Verdict:
         return Verdict.GATED
     if reason is Reason.TOO_OLD:
         return Verdict.LATE
-    if reason in {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT}:
+    if reason in {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT, Reason.ALIGNING}:
         return Verdict.BLIND
     if reason is Reason.SUPERVISOR:
         return Verdict.SUSPECT

@@ -1,0 +1,219 @@
+"""The streaming estimator: readings in at one door, in any order; the state out at any time."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.alignment import align
+from axialnav.fusion.config import Config
+from axialnav.fusion.errors import AxialnavError
+from axialnav.fusion.events import Events
+from axialnav.fusion.history import History
+from axialnav.fusion.kernels.propagate import propagate_filter
+from axialnav.fusion.kernels.run import health, run
+from axialnav.fusion.kernels.update import MIN_WEIGHT
+from axialnav.fusion.memory import (
+    LOG_CODE,
+    LOG_GATE,
+    LOG_INNOVATION,
+    LOG_NIS,
+    LOG_VARIANCE,
+    LOG_WEIGHT,
+    LOG_WIDTH,
+    TRACK_WIDTH,
+    Memory,
+    build_settings,
+    new_memory,
+    new_scratch,
+)
+from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
+from axialnav.fusion.packing import Packer
+from axialnav.fusion.readings import Reading
+from axialnav.fusion.sources import Kind, build_sources
+from axialnav.models.state import (
+    ACCEL_BIAS,
+    BLUR_SCALE,
+    E_POS,
+    E_VEL,
+    GYRO_BIAS,
+    POS,
+    QUAT,
+    UWB_BIAS,
+    VEL,
+    WALL_OFFSET,
+)
+
+Array = NDArray[np.float64]
+
+
+class NotStartedError(AxialnavError):
+    """The state was asked for before the filter had seen enough to start."""
+
+
+class CorridorEstimator:
+    """Full error-state filter (18 states) behind one door.
+
+    Parameters
+    ----------
+    config
+        Sensors, surfaces, first state and noise; ``Config()`` alone describes no sensors and takes no readings.
+
+    Notes
+    -----
+    Until ``start.window_s`` of inertial samples have come, readings are held; then the first state is found and they
+    are processed in order.  A reading that comes late is fused at its own stamp as long as it is within
+    ``delay.buffer_s`` of the newest; its older fellows are counted in :attr:`late` and dropped.
+    """
+
+    def __init__(self, config: Config | None = None) -> None:
+        self.config = config or Config()
+        self._packer = Packer(self.config)
+        self._sources = build_sources(self.config)
+        self._settings = build_settings(self.config)
+        self._scratch = new_scratch()
+        self._memory = new_memory(len(self._sources))
+        self._history = History(reach_ns=round(self.config.delay.buffer_s * 1e9))
+        self._aligned = False
+        self._start_ends_ns = -(2**62)
+        self._track, self._log = np.zeros((1, TRACK_WIDTH)), np.zeros((1, LOG_WIDTH))
+        self.late: Counter[str] = Counter()
+
+    def push(self, reading: Reading) -> Outcome:
+        """Take one reading and say what became of it.
+
+        Raises
+        ------
+        ReadingError
+            The reading does not belong to a configured sensor.
+        FlightError
+            The first samples cannot start a filter.
+        """
+        source, values = self._packer.pack(reading)
+        kind = self._sources["kind"][source]
+        if not self._sources["enabled"][source]:
+            return self._record(reading, Reason.DISABLED)
+        if self._aligned and not self._history.can_hold(reading.t_ns):
+            self.late[reading.sensor] += 1
+            return self._record(reading, Reason.TOO_OLD)
+        index = self._history.insert(reading.t_ns, source, values)
+        if reading.t_ns <= self._start_ends_ns:
+            self._aligned = False  # the first window has changed: start again from it
+        if not self._aligned:
+            if not self._align():
+                return self._record(reading, Reason.ALIGNING)
+            self._run_from(0, index)
+        elif index == len(self._history.entries) - 1:
+            self._run_from(index, index)
+        else:
+            start, self._memory = self._history.rewind(index)
+            self._run_from(start, index)
+        self._history.forget(self._start_ends_ns)
+        return self._record(reading, Reason.NONE) if kind == Kind.IMU else self._record_update(reading)
+
+    def state(self, t_ns: int | None = None) -> AxialState:
+        """State at ``t_ns`` (default: the newest inertial sample), carried forward with the last sample.
+
+        Raises
+        ------
+        NotStartedError
+            The filter has not been aligned yet.
+        """
+        if not self._aligned:
+            raise NotStartedError(
+                f"no state yet: the filter starts after {self.config.start.window_s:g} s of inertial samples"
+            )
+        memory = self._memory.copy()
+        core = memory.core[0]
+        now = int(core["t_imu"]) if t_ns is None else int(t_ns)
+        ahead_s = (now - int(core["t_imu"])) * 1e-9
+        if ahead_s > 0.0:
+            self._scratch["mean_imu"][0] = core["imu"]
+            propagate_filter(0, bool(core["imu_fault"]), ahead_s, memory.core[0], self._scratch[0], self._settings[0])
+        flags = health(now, self._sources, memory.sources, memory.core[0], self._settings[0])
+        return self._axial_state(now, memory, Health(flags))
+
+    def _align(self) -> bool:
+        """Find the first state once inertial samples span the first window; all events are then waiting to be run."""
+        entries = self._history.entries
+        imu = [e.t_ns for e in entries if self._sources["kind"][e.source] == Kind.IMU]
+        window_ns = round(self.config.start.window_s * 1e9)
+        if not imu or imu[-1] <= imu[0] + window_ns:
+            return False
+        held = Events(
+            np.array([e.t_ns for e in entries]),
+            np.array([e.source for e in entries]),
+            np.array([e.values for e in entries]),
+        )
+        self._memory = new_memory(len(self._sources))
+        align(self.config, self._sources, held, self._memory)
+        for entry in entries:
+            entry.before = None
+        self._start_ends_ns = imu[0] + window_ns
+        self._aligned = True
+        return True
+
+    def _run_from(self, start: int, wanted: int) -> None:
+        """Process the events from ``start`` on; the log row of the one at ``wanted`` is left in ``self._log``."""
+        row = np.zeros(LOG_WIDTH)
+        for at, entry in enumerate(self._history.entries[start:], start):
+            self._history.remember(at, self._memory)
+            self._run(entry.t_ns, entry.source, entry.values)
+            if at == wanted:
+                row[:] = self._log[0]
+        self._log[0] = row
+
+    def _run(self, t_ns: int, source: int, values: Array) -> None:
+        self._log[:] = 0.0
+        run(
+            np.array([t_ns]), np.array([source]), values[None, :], self._sources, self._memory.core,
+            self._memory.sources, self._scratch, self._settings, self._track, self._log,
+        )  # fmt: skip
+
+    def _record(self, reading: Reading, reason: Reason) -> Outcome:
+        return Outcome(reading.t_ns, reading.sensor, verdict_of(reason), reason)
+
+    def _record_update(self, reading: Reading) -> Outcome:
+        row = self._log[0]
+        code = int(row[LOG_CODE])
+        if code < 0:
+            return self._record(reading, Reason(-code))
+        fused = row[LOG_WEIGHT] > MIN_WEIGHT
+        return Outcome(
+            reading.t_ns,
+            reading.sensor,
+            Verdict.FUSED if fused else Verdict.GATED,
+            Reason.NONE if fused else Reason.INNOVATION,
+            innovation=tuple(row[LOG_INNOVATION : LOG_INNOVATION + code].tolist()),
+            variance=tuple(row[LOG_VARIANCE : LOG_VARIANCE + code].tolist()),
+            nis=float(row[LOG_NIS]),
+            gate=float(row[LOG_GATE]),
+            weight=float(row[LOG_WEIGHT]),
+        )
+
+    def _axial_state(self, t_ns: int, memory: Memory, flags: Health) -> AxialState:
+        x, P = memory.core["x"][0, 0], memory.core["P"][0, 0]
+        axis = np.array(self.config.axis)
+        position, velocity = x[POS : POS + 3].copy(), x[VEL : VEL + 3].copy()
+        position_P, velocity_P = P[E_POS : E_POS + 3, E_POS : E_POS + 3], P[E_VEL : E_VEL + 3, E_VEL : E_VEL + 3]
+        return AxialState(
+            t_ns=t_ns,
+            axial_position_m=float(axis @ position),
+            axial_velocity_m_s=float(axis @ velocity),
+            sigma_axial_position_m=float(np.sqrt(axis @ position_P @ axis)),
+            sigma_axial_velocity_m_s=float(np.sqrt(axis @ velocity_P @ axis)),
+            position_m=position,
+            velocity_m_s=velocity,
+            quaternion_WB=x[QUAT : QUAT + 4].copy(),
+            gyro_bias_rad_s=x[GYRO_BIAS : GYRO_BIAS + 3].copy(),
+            accel_bias_m_s2=x[ACCEL_BIAS : ACCEL_BIAS + 3].copy(),
+            blur_scale=float(x[BLUR_SCALE]),
+            uwb_bias_m=float(x[UWB_BIAS]),
+            wall_offset_m=float(x[WALL_OFFSET]),
+            covariance=P.copy(),
+            flags=flags,
+            resets=int(memory.core["resets"][0]),
+            last_reset_delta_m=memory.core["last_reset_m"][0].copy(),
+        )
