@@ -16,7 +16,7 @@ GAP_PERIODS = 5.0
 
 @dataclass(frozen=True, slots=True)
 class SensorRate:
-    """Readings of one sensor: count, median rate, and silences.
+    """Readings of one sensor: count, mean rate, and silences.
 
     ``rate_hz`` is None below two distinct stamps; ``gaps`` counts silences of more than 0.2 s and more than five median
     periods, ``longest_s`` and ``longest_at_s`` (after the first IMU sample) describe the longest of them.

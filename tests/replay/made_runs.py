@@ -121,14 +121,16 @@ def make_flight(track: Track, log: InnovationLog, config: Config, truth: Truth |
     return Flight("made", Path("made"), {"source": "made by a test"}, config, tables, truth, **options)  # type: ignore[arg-type]
 
 
-def make_run(seed: int = 0, count: int = 5000, *, truth: bool = True, initial: bool = True) -> Run:
+def make_run(
+    seed: int = 0, count: int = 5000, *, truth: bool = True, initial: bool = True, corridor: Corridor | None = None
+) -> Run:
     """A whole run: honest correlated errors, 10 % of the ranges gated, one reset, some dead reckoning."""
     rng = np.random.default_rng(seed)
     track = make_track(SIGMA_M_S * correlated_noise(count, 50.0, rng))
     track.flags[3000:3400] |= int(Health.DEAD_RECKONING)
     track.resets[3400:] = 1
     log = make_log(track.t_ns, rng)
-    config = make_config(initial=initial)
+    config = make_config(initial=initial, corridor=corridor)
     flight = make_flight(track, log, config, make_truth(count) if truth else None)
     columns = fused_columns(track, config.corridor)
     head = {"flight": "made", "estimator": "corridor", "digest": digest(columns)}

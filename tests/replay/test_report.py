@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from axialnav.fusion.config import Corridor, Section
 from axialnav.replay.report.decimate import envelope, line_points, minmax_rows, scatter_rows
 from axialnav.replay.report.page import render_report
 from tests.replay.made_runs import make_run
@@ -95,6 +96,14 @@ def test_without_truth_the_page_says_not_evaluated() -> None:
 
 def test_after_rigid_alignment_the_page_says_so() -> None:
     assert "rigid alignment" in Page(render_report(make_run(initial=False))).text
+
+
+def test_each_section_of_a_corridor_has_its_row() -> None:
+    straight = Section(kind="straight", start=(-3.0, 0.0, 0.0), end=(0.0, 0.0, 0.0))
+    stairs = Section(kind="stairs", start=(90.0, 0.0, 0.0), end=(99.0, 0.0, 3.0))
+    html = render_report(make_run(corridor=Corridor(section=(straight, stairs))))
+    assert re.search(r"<th>straight_1</th><td>0\.\d+</td>", html)
+    assert "<th>stairs_2</th><td>NOT_EVALUATED</td>" in html
 
 
 def test_text_from_a_recording_cannot_become_markup() -> None:

@@ -35,8 +35,16 @@ def build(run: Run) -> Section:
         "heads": [*COUNTS, "mean NIS", "lag-1", "time-outs"],
         "tips": TIPS,
         "sensors": sensors,
+        "sections": [(name, _section_cells(score)) for name, score in metrics["sections"].items()],
     }
     return Section("Verdict and coverage", template="verdict.html.j2", values=values)
+
+
+def _section_cells(score: dict[str, Any]) -> list[str]:
+    if score["rmse"] is None:
+        return [NOT_EVALUATED, "-", "-", "-", "-"]
+    numbers = [f"{score[key]:.3f}" for key in ("rmse", "mean_error", "max_abs_error", "mean_sigma")]
+    return [*numbers, f"{100.0 * score['in_3_sigma']:.1f} %"]
 
 
 def cards(metrics: dict[str, Any]) -> list[Card]:
