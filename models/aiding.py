@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 def height(p_W: Array, datum_m: float, H: Array) -> float:
     """Predict the barometric height [m] above a datum that was taken at the start; adds to the row ``H`` (18,)."""
     H[E_POS + 2] = 1.0
-    return p_W[2] + datum_m
+    return float(p_W[2] + datum_m)
 
 
 @kernel

@@ -96,4 +96,4 @@ def pixel_motion(
     H[E_BLUR_SCALE] = flow / (1.0 + x[BLUR_SCALE])
     if offset_is_state:
         H[E_WALL_OFFSET] = per_distance * work[7]
-    return flow
+    return float(flow)

@@ -28,7 +28,7 @@ def distance_along_ray(
     n2 = R_WB[0, 2] * normal_W[0] + R_WB[1, 2] * normal_W[1] + R_WB[2, 2] * normal_W[2]
     cosine = -(n0 * ray_B[0] + n1 * ray_B[1] + n2 * ray_B[2])
     if cosine <= 0.0:
-        return cosine
+        return float(cosine)
     height = normal_W[0] * p_W[0] + normal_W[1] * p_W[1] + normal_W[2] * p_W[2] - offset_m
     height += n0 * lever_B[0] + n1 * lever_B[1] + n2 * lever_B[2]
     distance = height / cosine
@@ -43,4 +43,4 @@ def distance_along_ray(
     out[5] = (hit2 * n0 - hit0 * n2) / cosine
     out[6] = (hit0 * n1 - hit1 * n0) / cosine
     out[7] = -1.0 / cosine
-    return cosine
+    return float(cosine)

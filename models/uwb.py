@@ -52,7 +52,7 @@ def _range_to(p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, sign: floa
 def uwb_range(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, H: Array) -> float:
     """Predict the range to ``anchor`` (3,) [m] and add its Jacobian to the zeroed row ``H`` (18,)."""
     H[E_UWB_BIAS] = 1.0
-    return _range_to(p_W, R_WB, lever_B, anchor, 1.0, H) + x[UWB_BIAS]
+    return float(_range_to(p_W, R_WB, lever_B, anchor, 1.0, H) + x[UWB_BIAS])
 
 
 @kernel
@@ -61,7 +61,7 @@ def uwb_tdoa(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor_a: Array,
     H[E_UWB_BIAS] = 1.0
     far = _range_to(p_W, R_WB, lever_B, anchor_b, 1.0, H)
     near = _range_to(p_W, R_WB, lever_B, anchor_a, -1.0, H)
-    return far - near + x[UWB_BIAS]
+    return float(far - near + x[UWB_BIAS])
 
 
 @kernel
@@ -79,4 +79,4 @@ def uwb_position(x: Array, p_W: Array, R_WB: Array, lever_B: Array, axial: float
     antenna = p_W[axis]
     for k in range(3):
         antenna += R_WB[axis, k] * lever_B[k]
-    return antenna + axial * x[UWB_BIAS]
+    return float(antenna + axial * x[UWB_BIAS])

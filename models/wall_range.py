@@ -36,4 +36,4 @@ def wall_range(
         H[E_ATT + i] = work[4 + i]
     if offset_is_state:
         H[E_WALL_OFFSET] = work[7]
-    return work[0]
+    return float(work[0])

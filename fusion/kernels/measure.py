@@ -37,7 +37,7 @@ def measure(s: Record, seen: Record, values: Array, x: Array, P: Array, m: Recor
     """
     w.H[:] = 0.0
     kind = s.kind
-    if kind == UWB_TDOA or kind == UWB_RANGE:
+    if kind in (UWB_TDOA, UWB_RANGE):
         return _measure_uwb(s, kind, values, x, w)
     if kind == FLOW:
         return _measure_flow(s, values, x, m, w)
@@ -68,7 +68,7 @@ def variance_of(claimed_sigma: float, floor_sigma: float) -> float:
 
 @kernel
 def _surface_offset(s: Record, x: Array) -> float:
-    return x[WALL_OFFSET] if s.offset_is_state else s.offset_m
+    return float(x[WALL_OFFSET] if s.offset_is_state else s.offset_m)
 
 
 @kernel

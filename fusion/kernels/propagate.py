@@ -66,4 +66,4 @@ def propagate(t_ns: int, values: Array, R_BS: Array, m: Record, w: Record, c: Re
     if m.on_trial == 1:
         propagate_filter(1, not fault, dt, m, w, c)
     m.t_imu = t_ns
-    return dt
+    return float(dt)

@@ -24,7 +24,7 @@ def in_doubt(dt: float, m: Record, c: Record) -> bool:
         m.correction_rate[i] = rate
         m.correction[i] = 0.0
         size2 += rate * rate
-    return size2 > c.doubt_m_s2 * c.doubt_m_s2
+    return bool(size2 > c.doubt_m_s2 * c.doubt_m_s2)
 
 
 @kernel

@@ -89,7 +89,7 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
         m.evidence += fuse(1, t_ns, s, seen, values, m, w, c, w.row) - likelihood
     if axes > 0 and log[LOG_WEIGHT] > MIN_WEIGHT:
         seen.t_fused = t_ns
-        if kind == FLOW or kind == BLUR:
+        if kind in (FLOW, BLUR):
             m.t_flow = t_ns
             m.t_aid = t_ns
         elif uwb:

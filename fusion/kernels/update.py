@@ -68,7 +68,7 @@ def fuse(
         if row == 0:
             for k in range(3):
                 m.correction[k] += w.step[E_VEL + k]
-    return -0.5 * (min(nis, gate) + log_det) / repeated
+    return float(-0.5 * (min(nis, gate) + log_det) / repeated)
 
 
 @kernel
