@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from axialnav.estimators.baselines.reading import BlurReading, grey, missing, unusable
 
+STRETCH_PERCENTILES = (1.0, 99.9)  # of the spectrum: single bins near zero must not set the threshold
 CROSS_PX = 2  # half width of the masked centre row and column
 CANNY_LOW, CANNY_HIGH = 50.0, 150.0
 MAX_TILT_RAD = math.radians(3.0)  # of a stripe against the vertical
@@ -67,8 +68,8 @@ def binarised_spectrum(picture: NDArray[np.float32]) -> NDArray[np.uint8]:
     inside = np.ones(spectrum.shape, dtype=np.uint8)
     inside[row - CROSS_PX : row + CROSS_PX + 1] = 0
     inside[:, col - CROSS_PX : col + CROSS_PX + 1] = 0
-    low, high = float(spectrum[inside > 0].min()), float(spectrum[inside > 0].max())
-    level = np.clip((spectrum - low) * (255.0 / (high - low)), 0.0, 255.0).astype(np.uint8)
+    low, high = (float(level) for level in np.percentile(spectrum[inside > 0], STRETCH_PERCENTILES))
+    level = np.clip((spectrum - low) * (255.0 / max(high - low, 1e-9)), 0.0, 255.0).astype(np.uint8)
     level[inside == 0] = 0
     _, binary = cv2.threshold(level, 0.0, 255.0, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
     return np.asarray(binary, dtype=np.uint8)

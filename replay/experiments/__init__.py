@@ -1,0 +1,1 @@
+"""The paper's experiments on image motion, run again on rendered walls."""
