@@ -164,6 +164,7 @@ def test_a_band_never_shrinks_by_decimation() -> None:
     assert np.all(np.interp(x, seconds, high) <= upper + 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine to open the page with")
 @pytest.mark.parametrize("width", [400, 1200])
 def test_a_browser_draws_every_plot_without_complaint(html: str, tmp_path: Path, width: int) -> None:
