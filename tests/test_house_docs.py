@@ -30,7 +30,7 @@ def test_every_option_is_on_the_page(verb: str, capsys: pytest.CaptureFixture[st
     assert cli.main([verb, "--help"]) == 0
     exists = options(capsys.readouterr().out)
     assert exists
-    assert options("\n".join(re.findall(r"^\| `(.*?)`", SECTIONS[verb], re.MULTILINE))) == exists
+    assert options("\n".join(re.findall(r"^\| (`.*?) \|", SECTIONS[verb], re.MULTILINE))) == exists
 
 
 def test_every_exit_code_is_on_the_page() -> None:
