@@ -35,10 +35,14 @@ def measure(s: Record, seen: Record, values: Array, x: Array, P: Array, m: Recor
     ``w.z``, ``w.h``, ``w.variance`` receive reading, prediction and noise variance per axis, ``w.H`` the Jacobian rows.
     ``w.p`` and ``w.R`` hold the position at the stamp and the attitude.
     """
-    w.H[:] = 0.0
+    for i in range(3):
+        for k in range(N_ERROR):
+            w.H[i, k] = 0.0
     kind = s.kind
-    if kind in (UWB_TDOA, UWB_RANGE):
-        return _measure_uwb(s, kind, values, x, w)
+    if kind == UWB_TDOA:
+        return _measure_tdoa(s, values, x, w)
+    if kind == UWB_RANGE:
+        return _measure_uwb_range(s, values, x, w)
     if kind == FLOW:
         return _measure_flow(s, values, x, m, w)
     if kind == BLUR:
@@ -84,23 +88,26 @@ def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
 
 
 @kernel
-def _measure_uwb(s: Record, kind: int, values: Array, x: Array, w: Record) -> int:
+def _measure_uwb_range(s: Record, values: Array, x: Array, w: Record) -> int:
     a = int(values[0])
     if not 0 <= a < s.n_anchors:
         return -UNKNOWN_ANCHOR
-    if kind == UWB_RANGE:
-        w.z[0] = values[1]
-        if not values[1] > 0.0:
-            return -OUT_OF_RANGE
-        w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], w.H[0])
-        w.variance[0] = variance_of(values[2], s.sigma)
-    else:
-        b = int(values[1])
-        if not 0 <= b < s.n_anchors:
-            return -UNKNOWN_ANCHOR
-        w.z[0] = values[2]
-        w.h[0] = uwb_tdoa(x, w.p, w.R, s.lever_B, s.anchors[a], s.anchors[b], w.H[0])
-        w.variance[0] = variance_of(values[3], s.sigma)
+    w.z[0] = values[1]
+    if not values[1] > 0.0:
+        return -OUT_OF_RANGE
+    w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], w.H[0])
+    w.variance[0] = variance_of(values[2], s.sigma)
+    return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
+
+
+@kernel
+def _measure_tdoa(s: Record, values: Array, x: Array, w: Record) -> int:
+    a, b = int(values[0]), int(values[1])
+    if not (0 <= a < s.n_anchors and 0 <= b < s.n_anchors):
+        return -UNKNOWN_ANCHOR
+    w.z[0] = values[2]
+    w.h[0] = uwb_tdoa(x, w.p, w.R, s.lever_B, s.anchors[a], s.anchors[b], w.H[0])
+    w.variance[0] = variance_of(values[3], s.sigma)
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
@@ -139,7 +146,7 @@ def _measure_flow(s: Record, values: Array, x: Array, m: Record, w: Record) -> i
 @kernel
 def _measure_blur(s: Record, values: Array, x: Array, P: Array, m: Record, w: Record) -> int:
     """Unsigned length: usable only while the direction of motion is known and the blur is long enough to see."""
-    signed = _pixel_motion(s, values[0], 0, x, m, w)
+    signed = _pixel_motion(s, values[0], np.int64(0), x, m, w)  # a literal 0 would compile the model once more
     if not np.isfinite(signed):
         return -NO_GEOMETRY
     spread = 0.0

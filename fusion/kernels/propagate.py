@@ -61,9 +61,8 @@ def propagate(t_ns: int, values: Array, R_BS: Array, m: Record, w: Record, c: Re
     rotate_sample(values, R_BS, m.imu)
     for i in range(6):
         w.mean_imu[i] = 0.5 * (w.mean_imu[i] + m.imu[i])
-    fault = m.imu_fault == 1
-    propagate_filter(0, fault, dt, m, w, c)
-    if m.on_trial == 1:
-        propagate_filter(1, not fault, dt, m, w, c)
+    for row in range(1 + m.on_trial):
+        # the rival believes the opposite of the estimate
+        propagate_filter(row, (m.imu_fault == 1) == (row == 0), dt, m, w, c)
     m.t_imu = t_ns
     return float(dt)

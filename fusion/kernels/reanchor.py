@@ -56,26 +56,23 @@ def _fade_fit(fade: float, seen: Record) -> None:
 
 
 @kernel
-def reanchor(t_ns: int, seen: Record, m: Record, c: Record) -> bool:
+def reanchor(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> bool:
     """Move the position to a source that has been refused too long, if one offset explains its readings."""
     aided = (t_ns - m.t_flow) * 1e-9 < FLOW_FRESH_S
     patience_s = c.reanchor_aided_s if aided else c.reanchor_alone_s
     if (t_ns - seen.t_trusted) * 1e-9 < patience_s:
         return False
-    normal = seen.fit.copy()
-    spread = np.linalg.eigvalsh(normal)
-    if not spread[0] * MAX_CONDITION > spread[2] > 0.0:
+    if not solve_symmetric(seen.fit, seen.fit_rhs, w.y):
         return False
-    offset = np.linalg.solve(normal, seen.fit_rhs.copy())
     explained = 0.0
     for a in range(3):
-        explained += seen.fit_rhs[a] * offset[a]
+        explained += seen.fit_rhs[a] * w.y[a]
     if explained < EXPLAINED * seen.fit_energy:
         return False
     for row in range(2):
-        _move(offset, m.x[row], m.P[row])
+        _move(w.y, m.x[row], m.P[row])
     for a in range(3):
-        m.last_reset_m[a] = offset[a]
+        m.last_reset_m[a] = w.y[a]
     m.resets += 1
     seen.t_trusted = t_ns
     seen.trust = 1.0
@@ -94,3 +91,29 @@ def _move(offset: Array, x: Array, P: Array) -> None:
             P[i, k] = 0.0
             P[k, i] = 0.0
         P[i, i] = variance
+
+
+@kernel
+def solve_symmetric(A: Array, b: Array, x: Array) -> bool:
+    """Solve the symmetric positive definite 3x3 system ``A x = b``; False where ``A`` is close to singular.
+
+    Cholesky factors by hand: the library's solver takes two seconds to compile for three unknowns.
+    """
+    largest = max(A[0, 0], max(A[1, 1], A[2, 2]))
+    d0 = A[0, 0]
+    if not d0 * MAX_CONDITION > largest:
+        return False
+    l10, l20 = A[1, 0] / d0, A[2, 0] / d0
+    d1 = A[1, 1] - l10 * A[1, 0]
+    if not d1 * MAX_CONDITION > largest:
+        return False
+    l21 = (A[2, 1] - l20 * A[1, 0]) / d1
+    d2 = A[2, 2] - l20 * A[2, 0] - l21 * l21 * d1
+    if not d2 * MAX_CONDITION > largest:
+        return False
+    y1 = b[1] - l10 * b[0]
+    y2 = b[2] - l20 * b[0] - l21 * y1
+    x[2] = y2 / d2
+    x[1] = y1 / d1 - l21 * x[2]
+    x[0] = b[0] / d0 - l10 * x[1] - l20 * x[2]
+    return True

@@ -11,7 +11,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from axialnav.models.jit import Record, kernel
+from axialnav.models.state import N_ERROR, N_NOMINAL
+
+Array = NDArray[np.float64]
 
 
 @kernel
@@ -39,8 +45,7 @@ def supervise_imu(dt: float, m: Record, c: Record) -> None:
         m.on_trial = 1
         m.t_trial = m.t_imu
         m.evidence = 0.0
-        m.x[1] = m.x[0]
-        m.P[1] = m.P[0]
+        copy_filter(m.x[0], m.P[0], m.x[1], m.P[1])
 
 
 @kernel
@@ -54,17 +59,27 @@ def _judge(fault: bool, over: bool, m: Record, c: Record) -> None:
             m.on_trial = 0
             m.good_trials = m.good_trials + 1 if evidence >= 0.0 else 0
             if m.good_trials >= c.trials_to_clear:
-                _swap(0, m)
+                _take_over(m)
     elif evidence > c.evidence:
-        _swap(1, m)
+        _take_over(m)
     elif over:
         m.on_trial = 0
 
 
 @kernel
-def _swap(fault: int, m: Record) -> None:
-    m.imu_fault = fault
+def _take_over(m: Record) -> None:
+    """The rival becomes the estimate, and with it its belief about the accelerometer."""
+    m.imu_fault = 1 - m.imu_fault
     m.on_trial = 0
     m.good_trials = 0
-    m.x[0] = m.x[1]
-    m.P[0] = m.P[1]
+    copy_filter(m.x[1], m.P[1], m.x[0], m.P[0])
+
+
+@kernel
+def copy_filter(from_x: Array, from_P: Array, to_x: Array, to_P: Array) -> None:
+    """Copy one filter over another (loops: slice assignment compiles ten times as long)."""
+    for i in range(N_NOMINAL):
+        to_x[i] = from_x[i]
+    for i in range(N_ERROR):
+        for j in range(N_ERROR):
+            to_P[i, j] = from_P[i, j]

@@ -17,6 +17,7 @@ from axialnav.fusion.kernels.update import MIN_WEIGHT, fuse, is_uwb
 from axialnav.fusion.memory import (
     LOG_CODE,
     LOG_WEIGHT,
+    LOG_WIDTH,
     TRACK_FLAGS,
     TRACK_POS_CROSS,
     TRACK_RESETS,
@@ -80,22 +81,26 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
     kind = s.kind
     gap_s = (t_ns - seen.t_seen) * 1e-9
     _note_arrival(t_ns, gap_s, kind, values, seen, m)
-    likelihood = fuse(0, t_ns, s, seen, values, m, w, c, log)
-    axes = int(log[LOG_CODE])
-    uwb = is_uwb(kind)
-    if axes > 0 and uwb:
-        observe_source(t_ns, gap_s, axes, log[LOG_WEIGHT], seen, w)
-    if m.on_trial == 1:
-        m.evidence += fuse(1, t_ns, s, seen, values, m, w, c, w.row) - likelihood
-    if axes > 0 and log[LOG_WEIGHT] > MIN_WEIGHT:
+    # the rival first, so that the record and the scratch left behind are the estimate's
+    for row in range(m.on_trial, -1, -1):
+        likelihood = fuse(row, t_ns, s, seen, values, m, w, c)
+        if m.on_trial == 1:
+            m.evidence += likelihood if row == 1 else -likelihood
+    for k in range(LOG_WIDTH):
+        log[k] = w.row[k]
+    used = log[LOG_CODE] > 0.0 and log[LOG_WEIGHT] > MIN_WEIGHT
+    if used:
         seen.t_fused = t_ns
-        if kind in (FLOW, BLUR):
+        if FLOW <= kind <= BLUR:
             m.t_flow = t_ns
             m.t_aid = t_ns
-        elif uwb:
+    if is_uwb(kind):
+        if used:
             m.t_aid = t_ns
-    elif uwb:
-        reanchor(t_ns, seen, m, c)
+        if log[LOG_CODE] > 0.0:
+            observe_source(t_ns, gap_s, int(log[LOG_CODE]), log[LOG_WEIGHT], seen, w)
+        if not used:
+            reanchor(t_ns, seen, m, w, c)
 
 
 @kernel

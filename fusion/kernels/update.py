@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import correct, project
 from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_RANGE, measure
-from axialnav.fusion.memory import LOG_CODE, LOG_GATE, LOG_INNOVATION, LOG_NIS, LOG_VARIANCE, LOG_WEIGHT
+from axialnav.fusion.memory import LOG_CODE, LOG_GATE, LOG_INNOVATION, LOG_NIS, LOG_VARIANCE, LOG_WEIGHT, LOG_WIDTH
 from axialnav.models.jit import Record, kernel
 from axialnav.models.rotations import matrix_from_quaternion
 from axialnav.models.state import E_VEL, N_ERROR, POS, QUAT, VEL
@@ -41,10 +41,8 @@ def repetition(gap_s: float, correlation_s: float) -> float:
 
 
 @kernel
-def fuse(
-    row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record, log: Array
-) -> float:
-    """Try one reading on filter ``row``; write its record to ``log`` (10,) and return its log-likelihood.
+def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
+    """Try one reading on filter ``row``; leave its record in ``w.row`` (10,) and return its log-likelihood.
 
     The log-likelihood is bounded (the NIS counts at most as much as the gate) and divided by the number of readings
     that repeat each other.  Axes of one reading are gated together and fused one after the other.
@@ -55,14 +53,16 @@ def fuse(
         w.p[i] = x[POS + i] + since_imu * x[VEL + i]
     matrix_from_quaternion(x[QUAT], x[QUAT + 1], x[QUAT + 2], x[QUAT + 3], w.R)
     axes = measure(s, seen, values, x, P, m, w, c)
-    log[LOG_CODE] = axes
+    for k in range(LOG_WIDTH):
+        w.row[k] = 0.0
+    w.row[LOG_CODE] = axes
     if axes < 0:
         return 0.0
     repeated = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
-    nis, log_det = _innovate(axes, repeated, P, w, log)
+    nis, log_det = _innovate(axes, repeated, P, w)
     gate = s.gate[axes - 1]
     weight = redescend(nis / axes, s.soft_nis) if nis <= gate else 0.0
-    log[LOG_NIS], log[LOG_GATE], log[LOG_WEIGHT] = nis, gate, weight
+    w.row[LOG_NIS], w.row[LOG_GATE], w.row[LOG_WEIGHT] = nis, gate, weight
     if weight > MIN_WEIGHT:
         _apply(axes, repeated / weight, x, P, w)
         if row == 0:
@@ -72,14 +72,14 @@ def fuse(
 
 
 @kernel
-def _innovate(axes: int, repeated: float, P: Array, w: Record, log: Array) -> tuple[float, float]:
+def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, float]:
     """Normalised innovation squared of all axes jointly, and log det S, by one elimination pass."""
     S, y = w.S, w.y
     for i in range(axes):
         y[i] = w.z[i] - w.h[i]
         S[i, i] = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
-        log[LOG_INNOVATION + i] = y[i]
-        log[LOG_VARIANCE + i] = S[i, i]
+        w.row[LOG_INNOVATION + i] = y[i]
+        w.row[LOG_VARIANCE + i] = S[i, i]
         for j in range(i + 1, axes):
             cross = 0.0
             for k in range(N_ERROR):
