@@ -24,7 +24,8 @@ def darkline_length(image: ArrayLike) -> BlurReading:
     this ideal law, because their fit describes their own test pictures.
 
     Known failure: below about 4 px the first line leaves the band, at low contrast the noise floor fills it, and the
-    texture's own dips imitate it; on a composite it reads ``N d``.
+    texture's own dips imitate it; on a composite the ridges hide the
+    first nulls, and it reads ``N d`` only while that is short (some 60 px).
 
     Parameters
     ----------
