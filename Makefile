@@ -40,10 +40,10 @@ demo: $(INSTALLED)
 	@$(BIN)/axialnav demo
 
 test: $(INSTALLED)
-	@$(BIN)/python -m pytest -rs
+	@$(BIN)/python -m pytest -rfEs
 
 quick: $(INSTALLED)
-	@$(BIN)/python -m pytest -rs -m "not slow"
+	@$(BIN)/python -m pytest -rfEs -m "not slow"
 
 lint: $(INSTALLED)
 	@$(BIN)/ruff check .
