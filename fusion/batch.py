@@ -29,12 +29,13 @@ from axialnav.fusion.memory import (
     TRACK_VARIANCE,
     TRACK_VEL_CROSS,
     TRACK_WIDTH,
+    Memory,
     build_settings,
     new_memory,
     new_scratch,
 )
 from axialnav.fusion.outcome import InnovationLog, Reason, Track, Verdict, verdict_of
-from axialnav.fusion.sources import Kind, build_sources, fused_sensors
+from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors
 from axialnav.models.state import E_ATT, E_POS, E_VEL, NOMINAL_SLICES
 
 Array = NDArray[np.float64]
@@ -100,27 +101,25 @@ def _run(config: Config, tables: Mapping[str, Table], progress: Callable[[float]
     track = np.zeros((int(is_imu.sum()), TRACK_WIDTH))
     log = np.zeros((len(events.t_ns), LOG_WIDTH))
     scratch, done, spent = new_scratch(), 0, 0.0
+    nothing = Events(*(column[:0] for column in events))
+    _step(nothing, src, memory, scratch, settings, track, log)  # loads or compiles the kernel: not the filter's time
     for part in np.array_split(np.arange(len(events.t_ns)), CHUNKS):
         cut = slice(part[0], part[-1] + 1) if len(part) else slice(0, 0)
         began = time.perf_counter()
-        done += run(
-            events.t_ns[cut],
-            events.source[cut],
-            events.values[cut],
-            src,
-            memory.core,
-            memory.sources,
-            scratch,
-            settings,
-            track[done:],
-            log[cut],
-        )
+        part_events = Events(*(column[cut] for column in events))
+        done += _step(part_events, src, memory, scratch, settings, track[done:], log[cut])
         spent += time.perf_counter() - began
         if progress is not None and len(part):
             progress((part[-1] + 1) / len(events.t_ns))
     return BatchResult(
         unpack_track(events.t_ns[is_imu], track), unpack_log(config, events, ~is_imu, log), spent, len(events.t_ns)
     )
+
+
+def _step(
+    events: Events, src: Records, memory: Memory, scratch: Records, settings: Records, track: Array, log: Array
+) -> int:
+    return run(*events, src, memory.core, memory.sources, scratch, settings, track, log)
 
 
 def unpack_track(t_ns: NDArray[np.int64], rows: Array) -> Track:

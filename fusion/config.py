@@ -129,9 +129,12 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
 
 
 class FlowTuning(_Table, frozen=True, kw_only=True):
-    """Noise of image motion."""
+    """Noise of image motion.
 
-    sigma_px: Positive = 1.8
+    A sensor that states no ``sigma_px`` of its own has ``sigma_rad`` times its focal length.
+    """
+
+    sigma_rad: Positive = 0.0043
     scale_sigma: Positive = 0.03
     scale_walk: NonNegative = 1e-4
     min_quality: NonNegative = 1.0

@@ -172,10 +172,10 @@ def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:
         case Uwb(sigma_m=claim, measurement=measurement):
             floor = config.uwb.fix_sigma_m if measurement == "position" else config.uwb.sigma_m
             return max(claim or 0.0, floor), config.uwb.gate  # receivers claim too little, never too much
-        case Flow(sigma_px=sigma):
-            return sigma or config.flow.sigma_px, config.flow.gate
-        case BlurMeter():
-            return config.flow.sigma_px, config.flow.gate
+        case Flow(sigma_px=sigma, focal_px=focal):
+            return sigma or config.flow.sigma_rad * max(focal), config.flow.gate
+        case BlurMeter(focal_px=focal):
+            return config.flow.sigma_rad * max(focal), config.flow.gate
         case RangeFinder(sigma_m=sigma):
             return sigma or config.range.sigma_m, config.range.gate
         case Barometer(sigma_m=sigma):

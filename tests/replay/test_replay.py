@@ -58,7 +58,7 @@ def test_a_replay_in_another_process_gives_the_same_digest(run: Run, tmp_path: P
 
 def test_the_config_of_a_run_repeats_that_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = str(sample_flight_path())
-    changed = ["--without", "att0,tof0", "--param", "flow.sigma_px=3", "--param", "imu.accel_noise_scale=2.0"]
+    changed = ["--without", "att0,tof0", "--param", "flow.sigma_rad=0.008", "--param", "imu.accel_noise_scale=2.0"]
     assert cli.main(["replay", log, "--out", str(tmp_path / "a"), *changed]) == 0
     assert "switched off" in capsys.readouterr().out
     assert cli.main(["replay", log, "--out", str(tmp_path / "b"), "--config", str(tmp_path / "a" / "config.toml")]) == 0
@@ -69,9 +69,9 @@ def test_the_config_of_a_run_repeats_that_run(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_a_changed_setting_changes_the_digest_and_is_named(run: Run) -> None:
-    other = an.replay(run.flight, params={"flow.sigma_px": "4.5"})
+    other = an.replay(run.flight, params={"flow.sigma_rad": "0.01"})
     assert other.metrics["digest"] != run.metrics["digest"]
-    assert "flow.sigma_px" in other.table.splitlines()[0]
+    assert "flow.sigma_rad" in other.table.splitlines()[0]
     assert "4.5" in other.table.splitlines()[0]
 
 
@@ -87,7 +87,7 @@ def test_progress_ends_at_one(run: Run) -> None:
     [
         ({"without": ["uwb7"]}, "uwb7.*imu0"),
         ({"params": {"flow.sigma": "1"}}, "flow.sigma.*did you mean"),
-        ({"params": {"flow.sigma_px": "-1"}}, "sigma_px"),
+        ({"params": {"flow.sigma_rad": "-1"}}, "sigma_rad"),
         ({"estimator": "kalman"}, "kalman.*corridor"),
     ],
 )
