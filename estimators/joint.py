@@ -18,15 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.positions import coherent_power, motion_basis, position_scores
-from axialnav.estimators.spectrum import pair_count
+from axialnav.estimators.spectrum import Band, pair_count
 from axialnav.estimators.texture import blur_power, matched_weight, shape_family, smooth_noise, texture_power
-from axialnav.estimators.window import Products
+from axialnav.estimators.products import Products
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
 MAX_STEP_PX = 0.3
 STEPS = 4
 TOLERANCE_PX = 1e-4
 PRIOR_DOF = 6.0
+NOISE_FLOOR, TINY = 1e-3, 1e-12
 WINDOW_VARIANCE = 1.6
 
 
@@ -45,7 +47,7 @@ class Fit:
     coherence
         ``sum_f w Re E`` per strip and pair, shape (s, p).
     texture, noise, weight
-        Power per row and frame, and the weights used, shape (f,).
+        Power per row and frame, and the weights used, shape (c, f).
     """
 
     motion: Array
@@ -59,27 +61,29 @@ class Fit:
 
 
 def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[Array, Array]:
-    """Smooth texture and noise power per row and frame, shape (f,), from the coherent part at these positions."""
-    frames, rows = products.frames, float(products.rows.sum())
-    omega = 2.0 * np.pi * products.band.frequency()
-    mean_power = products.power.sum(axis=0) / (frames * rows)
-    pairs = np.empty(products.band.count)
-    coherent_power(products.re.sum(axis=0), products.im.sum(axis=0), omega, position_px, pairs)
-    coherent = mean_power / frames + 2.0 * pairs / (frames**2 * rows)
-    incoherent = (mean_power - coherent) * frames / (frames - 1)
-    noise = smooth_noise(incoherent, 1e-3 * float(mean_power.mean()) + 1e-12)
-    band = products.band
+    """Smooth texture and noise power per row and frame, shape (c, f), from the coherent part at these positions."""
+    frames, rows, band = products.frames, products.rows.sum(axis=0), products.band
+    omega = 2.0 * np.pi * band.frequency()
     shapes = shape_family(band.first, band.count, band.length) * blur_power(blur_px, band.frequency())
-    return texture_power(coherent, noise / frames, int(rows), shapes), noise
+    re, im, power = products.re.sum(axis=0), products.im.sum(axis=0), products.power.sum(axis=0, dtype=np.float64)
+    pairs = np.empty(band.count)
+    texture, noise = np.empty_like(power), np.empty_like(power)
+    for c in range(len(rows)):
+        mean_power = power[c] / (frames * rows[c])
+        coherent_power(re[c], im[c], omega, position_px, pairs)
+        coherent = mean_power / frames + 2.0 * pairs / (frames**2 * rows[c])
+        incoherent = (mean_power - coherent) * frames / (frames - 1)
+        noise[c] = smooth_noise(incoherent, NOISE_FLOOR * float(mean_power.mean()) + TINY)
+        texture[c] = texture_power(coherent, noise[c] / frames, int(rows[c]), shapes)
+    return texture, noise
 
 
-def evaluate(products: Products, position_px: Array, weight: Array) -> tuple[Array, Array, Array]:
-    """Score (s, n), information (s, n, n) and coherence (s, p) of every strip at these positions."""
-    strips, frames = products.re.shape[0], products.frames
+def evaluate(re: Plane, im: Plane, band: Band, position_px: Array) -> tuple[Array, Array, Array]:
+    """Score (s, n), information (s, n, n) and coherence (s, p) of every strip from weighted products (s, p, f)."""
+    strips, frames = re.shape[0], len(position_px)
     score, information = np.empty((strips, frames)), np.empty((strips, frames, frames))
     coherence = np.empty((strips, pair_count(frames)))
-    omega = 2.0 * np.pi * products.band.frequency()
-    position_scores(products.re, products.im, omega, weight, position_px, score, information, coherence)
+    position_scores(re, im, 2.0 * np.pi * band.frequency(), position_px, score, information, coherence)
     return score, information, coherence
 
 
@@ -108,8 +112,9 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
         position = basis @ motion - products.offset_px
         texture, noise = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
         weight = matched_weight(texture, noise, products.frames)
+        re, im = products.weighted(weight)
         for _ in range(STEPS):
-            score, information, coherence = evaluate(products, basis @ motion - products.offset_px, weight)
+            score, information, coherence = evaluate(re, im, products.band, basis @ motion - products.offset_px)
             J = basis.T @ information.sum(axis=0) @ basis
             if not (np.all(np.isfinite(J)) and float(np.linalg.eigvalsh(J)[0]) > 0.0):
                 return None

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.integrity import Choice, choose
+from axialnav.estimators.layout import STRIPS
+from axialnav.estimators.products import Products
 from axialnav.estimators.joint import Fit, fit_motion, sigma_of
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.search import STEP_PX, Profiles, lag_sums, profiles, unrelated_spread
 from axialnav.estimators.texture import matched_weight, shape_family, texture_power
-from axialnav.estimators.window import FrameWindow, Products
+from axialnav.estimators.window import FrameWindow
 
 Array = NDArray[np.float64]
 BANDS = 5
+TINY = 1e-12
 ENOUGH_BANDS = 3
 MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
 MAX_SIGMA_PX = 0.3
 PRIOR_SIGMAS = 5.0
 PRIOR_MARGIN_PX = 1.0
-NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold noise alone, to first order
+NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold mostly noise
 
 
 @dataclass(frozen=True)
@@ -64,16 +68,22 @@ def search_grid(width: int, frames: int, prior_px: tuple[float, float] | None) -
 
 
 def search(products: Products, grid_px: Array) -> Profiles:
-    """Profiles of all bands from fixed windows."""
-    frames, rows = products.frames, float(products.rows.sum())
-    power = products.power.sum(axis=0) / (frames * rows)
-    level = float(power[int(NOISE_SHARE * len(power)) :].mean()) + 1e-12
-    noise = np.full_like(power, level)
-    band = products.band
+    """Profiles of all bands of the picture from fixed windows."""
+    frames, band, rows = products.frames, products.band, products.rows.sum(axis=0)
+    power = products.power.sum(axis=0, dtype=np.float64) / (frames * rows[:, None])
+    tail = int(NOISE_SHARE * band.count)
+    noise = np.full_like(power, float(power[-1, tail:].mean()) + TINY)
     shapes = shape_family(band.first, band.count, band.length)
-    weight = matched_weight(texture_power(power, noise, int(rows * frames), shapes), noise, frames)
-    spread = unrelated_spread(products.power, weight, frames, products.rows)
-    return profiles(lag_sums(products.re, products.im, frames), weight, band, grid_px, spread)
+    texture = [texture_power(power[c], noise[c], int(rows[c] * frames), shapes) for c in range(len(rows))]
+    weight = matched_weight(np.array(texture), noise, frames)
+    re, im = (_folded(plane) for plane in products.weighted(weight))
+    spread = unrelated_spread(_folded(products.power), weight, frames, _folded(products.rows))
+    return profiles(lag_sums(re, im, frames), band, grid_px, spread)
+
+
+def _folded(strips: NDArray[Any]) -> NDArray[Any]:
+    """Strips (s, ...) summed into bands (b, ...)."""
+    return np.asarray(strips.reshape(BANDS, -1, *strips.shape[1:]).sum(axis=1))
 
 
 def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
@@ -93,7 +103,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=bands)
 
     grid = search_grid(window.band.length, frames, options.prior_px)
-    found = search(window.fixed().grouped(BANDS), grid)
+    found = search(window.fixed(), grid)
     choice = choose(found, options.consensus)
     asked = (int(choice.agree.sum()), BANDS)
     reason = doubt_search(found, choice, options)
@@ -109,7 +119,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
 
 
 def _follow(window: FrameWindow, start_px: float, choice: Choice, options: JointOptions) -> Fit | None:
-    strips = np.repeat(choice.agree, len(window.edges[1:]) // BANDS)
+    strips = np.repeat(choice.agree, STRIPS // BANDS)
     products = window.following(start_px).selected(strips)
     return fit_motion(products, np.array([start_px]), options.exposure_ratio)
 

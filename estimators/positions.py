@@ -26,16 +26,15 @@ def position_scores(
     re: Plane,
     im: Plane,
     omega: Array,
-    weight: Array,
     position: Array,
     score: Array,
     information: Array,
     coherence: Array,
 ) -> None:
-    """Fill score (s, n), information (s, n, n) and coherence (s, p) = ``sum_f w Re E`` of every strip.
+    """Fill score (s, n), information (s, n, n) and coherence (s, p) = ``sum_f Re E`` of every strip.
 
-    Pair products ``re``, ``im`` (s, p, f) in the order of ``pair_frames``; ``omega`` (f,) [rad/px]; ``weight`` (f,);
-    ``position`` (n,) [px] at which to evaluate.
+    Pair products ``re``, ``im`` (s, p, f), weights included, in the order of ``pair_frames``; ``omega`` (f,)
+    [rad/px]; ``position`` (n,) [px] at which to evaluate.
     """
     strips, _, count = re.shape
     frames = position.shape[0]
@@ -45,8 +44,7 @@ def position_scores(
         for f in range(count):
             cosine[k, f] = np.cos(omega[f] * position[k])
             sine[k, f] = np.sin(omega[f] * position[k])
-    first = weight * omega
-    second = first * omega
+    omega2 = omega * omega
     score[:] = 0.0
     information[:] = 0.0
     p = 0
@@ -62,9 +60,9 @@ def position_scores(
                     d = sine[i, f] * cosine[j, f] - cosine[i, f] * sine[j, f]
                     e_re = a[f] * c - b[f] * d
                     e_im = a[f] * d + b[f] * c
-                    sum_re += weight[f] * e_re
-                    slope -= first[f] * e_im
-                    bend += second[f] * e_re
+                    sum_re += e_re
+                    slope -= omega[f] * e_im
+                    bend += omega2[f] * e_re
                 coherence[s, p] = sum_re
                 score[s, i] += 2.0 * slope
                 score[s, j] -= 2.0 * slope

@@ -7,6 +7,8 @@ upright objects fixed to the camera live, and a wall that moves leaves almost no
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +16,12 @@ from numpy.typing import NDArray
 from axialnav.models.jit import kernel
 
 Plane = NDArray[np.float32]
-TARGET_ROWS = 135
+BUDGET = 270_000  # binned pixels per frame: what a millisecond or two of one core can chew
 
 
-def bin_height(height: int) -> int:
-    """Rows summed into one bin, for about 135 bins."""
-    return max(1, round(height / TARGET_ROWS))
+def bin_height(height: int, width: int) -> int:
+    """Rows summed into one bin, so that a binned frame stays within the budget."""
+    return max(1, math.ceil(height * width / BUDGET))
 
 
 @kernel
@@ -78,7 +80,7 @@ def apply_window(rows: Plane, start: int, window: Plane, out: Plane) -> None:
             out[r, c] = rows[r, start + c] * window[c]
 
 
-def tukey(length: int, share: float = 0.25) -> Plane:
+def tukey(length: int, share: float = 0.12) -> Plane:
     """Window (length,) with cosine flanks over ``share`` of it."""
     flank = int(share * (length - 1) / 2)
     window = np.ones(length, dtype=np.float32)

@@ -54,7 +54,7 @@ class Profiles:
 
 
 def lag_sums(re: Plane, im: Plane, frames: int) -> NDArray[np.complex64]:
-    """Sum the pair products (b, p, f) of equal distance in time: complex, shape (b, n - 1, f), lag 1 first."""
+    """Sum weighted pair products (b, p, f) of equal distance in time: complex, shape (b, n - 1, f), lag 1 first."""
     bands, _, count = re.shape
     sums = np.zeros((bands, frames - 1, count), dtype=np.complex64)
     p = 0
@@ -66,15 +66,13 @@ def lag_sums(re: Plane, im: Plane, frames: int) -> NDArray[np.complex64]:
     return sums
 
 
-def profiles(sums: NDArray[np.complex64], weight: Array, band: Band, grid_px: Array, spread: Array) -> Profiles:
-    """Evaluate ``2 sum_m sum_f w Re(C_m exp(-i w d m))`` on the grid of displacements.
+def profiles(sums: NDArray[np.complex64], band: Band, grid_px: Array, spread: Array) -> Profiles:
+    """Evaluate ``2 sum_m sum_f Re(C_m exp(-i w d m))`` on the grid of displacements.
 
     Parameters
     ----------
     sums
-        Lag sums C_m, shape (b, lags, f).
-    weight
-        Matched weights, shape (f,).
+        Lag sums C_m, weights included, shape (b, lags, f).
     band
         Frequencies in use.
     grid_px
@@ -84,7 +82,7 @@ def profiles(sums: NDArray[np.complex64], weight: Array, band: Band, grid_px: Ar
     """
     length = 2 * band.length
     padded = np.zeros((*sums.shape[:2], length // 2 + 1), dtype=np.complex64)
-    padded[..., band.first : band.last] = np.conj(sums) * weight.astype(np.float32)
+    padded[..., band.first : band.last] = np.conj(sums)
     correlation = scipy.fft.irfft(padded, length, axis=-1) * np.float32(length)
     gain = np.zeros((sums.shape[0], grid_px.shape[0]))
     _gather(np.asarray(correlation, dtype=np.float32), grid_px, 2.0, gain)
@@ -104,20 +102,21 @@ def _gather(correlation: Plane, grid_px: Array, samples_per_px: float, gain: Arr
                 gain[b, d] += line[left % length] * (1.0 - share) + line[(left + 1) % length] * share
 
 
-def unrelated_spread(power: Array, weight: Array, frames: int, rows: Array) -> Array:
+def unrelated_spread(power: Plane, weight: Array, frames: int, rows: Array) -> Array:
     """Standard deviation of the profile of frames that share nothing but their spectra, shape (b,).
 
     Parameters
     ----------
     power
-        Power summed over the rows of a band and all frames, shape (b, f).
+        Power summed over the rows of a band and all frames, shape (b, c, f).
     weight
-        Matched weights, shape (f,).
+        Matched weights, shape (c, f).
     frames
         Number of frames.
     rows
-        Rows of every band, shape (b,).
+        Rows of every band and class, shape (b, c).
     """
     pairs = 0.5 * frames * (frames - 1)
     of_one_frame = weight * power / frames
-    return np.asarray(np.sqrt(2.0 * HANN_VARIANCE * pairs * np.sum(of_one_frame**2, axis=-1) / rows))
+    variance = np.sum(np.sum(of_one_frame**2, axis=-1) / rows, axis=-1)
+    return np.asarray(np.sqrt(2.0 * HANN_VARIANCE * pairs * variance))

@@ -19,7 +19,7 @@ from axialnav.models.jit import kernel
 Plane = NDArray[np.float32]
 Array = NDArray[np.float64]
 FIRST_BIN = 4  # below: lamps and vignettes
-LAST_FREQUENCY = 0.42  # cycles per pixel; above: aliasing
+LAST_FREQUENCY = 0.48  # cycles per pixel; above: aliasing
 
 
 @dataclass(frozen=True)
