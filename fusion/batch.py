@@ -101,13 +101,13 @@ def _run(config: Config, tables: Mapping[str, Table], progress: Callable[[float]
     track = np.zeros((int(is_imu.sum()), TRACK_WIDTH))
     log = np.zeros((len(events.t_ns), LOG_WIDTH))
     scratch, done, spent = new_scratch(), 0, 0.0
-    nothing = Events(*(column[:0] for column in events))
-    _step(nothing, src, memory, scratch, settings, track, log)  # loads or compiles the kernel: not the filter's time
+    _step(
+        events.part(slice(0, 0)), src, memory, scratch, settings, track, log
+    )  # loads or compiles the kernel: not the filter's time
     for part in np.array_split(np.arange(len(events.t_ns)), CHUNKS):
         cut = slice(part[0], part[-1] + 1) if len(part) else slice(0, 0)
         began = time.perf_counter()
-        part_events = Events(*(column[cut] for column in events))
-        done += _step(part_events, src, memory, scratch, settings, track[done:], log[cut])
+        done += _step(events.part(cut), src, memory, scratch, settings, track[done:], log[cut])
         spent += time.perf_counter() - began
         if progress is not None and len(part):
             progress((part[-1] + 1) / len(events.t_ns))

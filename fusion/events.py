@@ -61,6 +61,10 @@ class Events(NamedTuple):
     source: NDArray[np.int64]
     values: NDArray[np.float64]
 
+    def part(self, cut: slice) -> Events:
+        """The events of a slice."""
+        return Events(self.t_ns[cut], self.source[cut], self.values[cut])
+
 
 def tie_break(values: NDArray[np.float64]) -> tuple[Any, Any, Any]:
     """Key that orders events of equal stamp and source by their first three values (NaN last).
