@@ -1,0 +1,35 @@
+"""The benches run on the flight that ships with the package, so that they cannot rot between two uses."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from axialnav.replay.sample_flights import sample_flight_path
+from tests.bench.bench_flights import tables
+from tests.bench.flights import DEFAULT, PLAIN, Case
+from tests.bench.slider import slider_table
+
+SAMPLE = sample_flight_path()
+
+
+def cells(text: str, start: str) -> list[list[str]]:
+    """Cells of the table rows whose first cell starts so."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
+    return [row for row in rows if row[0].startswith(start)]
+
+
+def test_the_flight_tables_show_a_limit_that_is_kept_and_one_that_is_not() -> None:
+    cases = (Case(SAMPLE.name, speed_m_s=0.5), Case(SAMPLE.name, ("tof0",), speed_m_s=1e-6))
+    text = tables(cases, SAMPLE.parent, {"default": DEFAULT, "plain": PLAIN})
+    kept, missed = (row for row in cells(text, SAMPLE.name) if len(row) == 11)
+    assert kept[-1] == "ok"
+    assert missed[0] == f"{SAMPLE.name} without tof0"
+    assert missed[-1] == "SHORT: speed"
+    compared = [row for row in cells(text, SAMPLE.name) if len(row) == 3]
+    assert [bool(re.fullmatch(r"\d+\.\d{3}", value)) for row in compared for value in row[1:]] == [True] * 4
+
+
+def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
+    assert tables((Case("nowhere"),), tmp_path) == f"skipped: nowhere is not in {tmp_path}"
+    assert slider_table(tmp_path) == f"skipped: davis_slider_far is not in {tmp_path}"
