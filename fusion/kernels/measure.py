@@ -122,7 +122,7 @@ def _measure_fix(s: Record, values: Array, x: Array, w: Record, c: Record) -> in
 
 
 @kernel
-def _pixel_motion(s: Record, window_s: float, axis: int, x: Array, m: Record, w: Record) -> float:
+def _pixel_motion(s: Record, window_s: float, axis: int | np.int64, x: Array, m: Record, w: Record) -> float:
     for i in range(2):
         w.focal_window[i] = s.focal_px[i] * window_s
     return pixel_motion(
