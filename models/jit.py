@@ -17,6 +17,7 @@ F = TypeVar("F", bound=Callable[..., object])
 
 Record: TypeAlias = Any  # one element of a structured array inside a kernel: fields are attributes
 Records: TypeAlias = NDArray[np.void]
+Integer: TypeAlias = int | np.int64  # a literal int would be compiled as a constant of its own
 
 
 def kernel(function: F) -> F:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
+from axialnav.models.jit import Integer, kernel
 from axialnav.models.ray import distance_along_ray
 from axialnav.models.state import (
     BLUR_SCALE,
@@ -49,7 +49,7 @@ def pixel_motion(
     offset_m: float,
     offset_is_state: bool,
     focal_window: Array,
-    axis: int,
+    axis: Integer,
     H: Array,
     work: Array,
 ) -> float:

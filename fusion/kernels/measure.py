@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Integer, Record, kernel
 from axialnav.models.pixel_motion import pixel_motion
 from axialnav.models.state import E_VEL, N_ERROR, WALL_OFFSET
 from axialnav.models.uwb import uwb_position, uwb_range, uwb_tdoa
@@ -122,7 +122,7 @@ def _measure_fix(s: Record, values: Array, x: Array, w: Record, c: Record) -> in
 
 
 @kernel
-def _pixel_motion(s: Record, window_s: float, axis: int | np.int64, x: Array, m: Record, w: Record) -> float:
+def _pixel_motion(s: Record, window_s: float, axis: Integer, x: Array, m: Record, w: Record) -> float:
     for i in range(2):
         w.focal_window[i] = s.focal_px[i] * window_s
     return pixel_motion(
