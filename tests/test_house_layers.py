@@ -19,7 +19,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "pymavlink": ("fusion/live/", "replay/readers/"),
     "filterpy": ("fusion/axial.py",),
     "scipy.stats": (),
-    "matplotlib": (),
+    "matplotlib": ("replay/experiments/",),
     "plotly": ("replay/",),
     "jinja2": ("replay/",),
     "rich": ("replay/",),
