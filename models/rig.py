@@ -30,9 +30,11 @@ class Sensor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     def __post_init__(self) -> None:
         matrix = np.array(self.T_BS, dtype=np.float64).reshape(4, 4)
+        if not np.isfinite(matrix).all():
+            raise ValueError(f"T_BS must hold finite numbers only, got {self.T_BS}")
         rotation = matrix[:3, :3]
         error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-        if not (math.isfinite(error) and error < ROTATION_TOLERANCE and np.linalg.det(rotation) > 0.0):
+        if not (error < ROTATION_TOLERANCE and np.linalg.det(rotation) > 0.0):
             raise ValueError(
                 f"T_BS must hold a right-handed rotation, but R R^T differs from the identity by {error:.3g} "
                 f"(limit {ROTATION_TOLERANCE}) and det R is {np.linalg.det(rotation):.3g}; check rows and signs"
