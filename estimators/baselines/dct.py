@@ -21,8 +21,8 @@ def dct_length(image: ArrayLike) -> BlurReading:
     whose first null lies at :math:`k_0 = 2W / l`; hence :math:`l = 2W / k_0` (the paper's equations 8 and 9). The
     squared transforms of all rows are averaged and the first prominent dip is taken for ``k_0``.
 
-    Known failure: as every method that looks for nulls, below about 4 px and at low contrast; on a composite it
-    reads ``N d``.
+    Known failure: as every method that looks for nulls, below about 4 px and at low contrast; on a composite
+    the ridges hide the first nulls, and it reads ``N d`` only while that is short (some 60 px).
 
     Parameters
     ----------

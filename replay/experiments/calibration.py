@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.models.camera import CompositeBlur, composite_law
 from axialnav.replay.experiments.figures import COLOURS, INK, draw
 from axialnav.replay.experiments.line import Line, fit_line
 from axialnav.replay.experiments.methods import METHODS, Window
@@ -39,7 +40,7 @@ Array = NDArray[np.float64]
 
 def law_m_s_px() -> float:
     """Slope of the composite law ``v = l_c p H / (h N T)`` [m/s per px]; 0.0202 for the paper's camera at 2.026 m."""
-    return DISTANCE_M / (CAMERA.focal_px * FRAMES * CAMERA.frame_period_s)
+    return composite_law(CompositeBlur(1.0, FRAMES, CAMERA.frame_period_s), CAMERA.focal_px, DISTANCE_M)
 
 
 def run(out: Path, seed: int, trials: int | None) -> ExperimentResult:

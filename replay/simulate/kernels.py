@@ -109,3 +109,44 @@ def resample(wall, x_px, y_px, roll, yaw, focal_px, shift, left, top, density, o
                 line = wall[r - 1 + j]
                 total += wy[j] * (wx[0] * line[c - 1] + wx[1] * line[c] + wx[2] * line[c + 1] + wx[3] * line[c + 2])
             out[v, u] = total
+
+
+@numba.njit(cache=True, fastmath=True)
+def expose_plane(light, maps, weights, first, density, out):  # pragma: no cover - compiled
+    """Weighted sum of a plane picture over several homographies, bilinear between its samples.
+
+    Parameters
+    ----------
+    light
+        The part of the plane in view, float32, shape (rows, cols).
+    maps
+        From homogeneous pixels to samples of ``light``, shape (m, 3, 3).
+    weights
+        Of the homographies, float32, shape (m,).
+    first
+        Number of the picture's row that ``out[0]`` is.
+    density
+        Samples of ``out`` per px along the rows.
+    out
+        float32, shape (h, ``density`` * w).
+    """
+    most_col, most_row = light.shape[1] - 2, light.shape[0] - 2
+    step = np.float64(1.0 / density)
+    for v in range(out.shape[0]):
+        line = out[v]
+        line[:] = 0.0
+        y = np.float64(first + v)
+        for m in range(maps.shape[0]):
+            h, weight = maps[m], weights[m]
+            x0, y0, z0 = h[0, 1] * y + h[0, 2], h[1, 1] * y + h[1, 2], h[2, 1] * y + h[2, 2]
+            xu, yu, zu = h[0, 0] * step, h[1, 0] * step, h[2, 0] * step
+            for i in range(line.size):
+                scale = 1.0 / (zu * i + z0)
+                col = (xu * i + x0) * scale
+                row = (yu * i + y0) * scale
+                c, r = min(np.int32(col), most_col), min(np.int32(row), most_row)
+                a, b = np.float32(col - c), np.float32(row - r)
+                upper, lower = light[r], light[r + 1]
+                above = upper[c] + a * (upper[c + 1] - upper[c])
+                below = lower[c] + a * (lower[c + 1] - lower[c])
+                line[i] += weight * (above + b * (below - above))
