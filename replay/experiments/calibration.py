@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from axialnav.models.camera import CompositeBlur, composite_law
 from axialnav.replay.experiments.figures import COLOURS, INK, draw
 from axialnav.replay.experiments.line import Line, fit_line
-from axialnav.replay.experiments.methods import METHODS, Window
+from axialnav.replay.experiments.methods import METHODS, Window, known
 from axialnav.replay.experiments.result import ExperimentResult
 from axialnav.replay.experiments.tables import Table
 from axialnav.replay.simulate.render import (
@@ -33,7 +33,7 @@ FRAMES, CONTRAST, TRIALS = 5, 0.1, 60
 SLOWEST_M_S, FASTEST_M_S = 0.1, 2.5
 PIXEL_M, LENS_M, DISTANCE_M = 3.24e-6, 1.95e-3, 2.026
 CAMERA = CameraModel(width=1920, height=1080, focal_px=LENS_M / PIXEL_M)
-FITTED = ("stripes, composite", "stripes, composite, oracle", "DCT, composite", "composite fit", "joint")
+FITTED = known(("stripes, composite", "stripes, composite, oracle", "DCT, composite", "composite fit", "joint"))
 PAPER = ("the paper, against UWB", 0.0199, 0.0047, 0.0535)
 Array = NDArray[np.float64]
 

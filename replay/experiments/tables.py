@@ -24,7 +24,7 @@ class Table:
             raise ValueError(f"every row needs {len(self.columns)} cells, as there are columns")
 
     def text(self) -> str:
-        """Aligned columns; numbers with three significant figures, a dash where there is none."""
+        """Aligned columns; numbers with four significant figures, a dash where there is none."""
         cells = [list(self.columns), *([shown(cell) for cell in row] for row in self.rows)]
         widths = [max(len(row[i]) for row in cells) for i in range(len(self.columns))]
         lines = ["  ".join(_aligned(row, widths)).rstrip() for row in cells]
@@ -48,7 +48,7 @@ class Table:
 def shown(cell: Cell) -> str:
     """A cell for people."""
     if isinstance(cell, float):
-        return "-" if math.isnan(cell) else f"{cell:.3g}"
+        return "-" if math.isnan(cell) else f"{cell:.4g}"
     return str(cell)
 
 
