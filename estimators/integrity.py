@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
+from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.products import Products
 from axialnav.estimators.search import SOFTENING, Profiles
 
 Array = NDArray[np.float64]
@@ -15,6 +18,13 @@ REACH_PX = 0.75
 OPPOSED = 8.0  # softened log-likelihood by which a band must prefer another displacement to count as opposed
 SURE = 6.0  # standard deviations of unrelated frames above which a band has an opinion of its own
 STATIC_PX = 1.0
+MAX_WHITENESS = 0.4
+FINE_FROM, MIDDLE = 0.75, (0.2, 0.45)
+FAR = 4.0
+MEDIAN_OF_NORMAL = 0.6745
+MAX_LOST_STRIPS = 5
+MAX_ALIEN = 1.4
+TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -67,3 +77,44 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
         choices.append((int(opposed.sum()), -likelihood, place, opposed))
     _, _, place, opposed = min(choices, key=lambda choice: choice[:2])
     return Choice(place, ~opposed, opposed)
+
+
+def quarrelling(fit: Fit, products: Products) -> Mask:
+    """Strips whose own displacement lies far from the common one, shape (s,).
+
+    ``products`` is not needed; far is measured by their own information and by how much strips differ in general, so that a picture that is uneven
+    everywhere loses none.
+    """
+    basis = motion_basis(fit.score.shape[1], len(fit.motion) == 2)[:, 0]
+    own = np.einsum("i,sij,j->s", basis, fit.information, basis)
+    score = fit.score @ basis
+    deviation = np.abs(score) / np.sqrt(WINDOW_VARIANCE * np.maximum(own, TINY))
+    usual = max(1.0, float(np.median(deviation)) / MEDIAN_OF_NORMAL)
+    return np.asarray((deviation > FAR * usual) | (own <= 0.0))
+
+
+def disturbed(fit: Fit, products: Products) -> Mask:
+    """Strips with clearly more power that does not move with the wall than the usual strip, shape (s,).
+
+    Something fixed to the camera leaves the windows that follow the wall, and is noise to them; in a strip of its own
+    it costs less left out than carried along.
+    """
+    frames = products.frames
+    whole = np.einsum("scf,cf->s", products.power, fit.weight)
+    moving = whole + 2.0 * fit.coherence.sum(axis=1)
+    alien = (whole - moving / frames) / (frames - 1) / products.rows.sum(axis=1)
+    order = np.argsort(alien)
+    usual = float(np.median(alien[order[: (len(alien) + 1) // 2 + 1]]))
+    bad = alien > MAX_ALIEN * usual
+    bad[order[: len(alien) - MAX_LOST_STRIPS]] = False
+    return np.asarray(bad)
+
+
+def whiteness(fit: Fit) -> float:
+    """Fine over middle part of the repeating power [-]: about 1 for a pixel pattern, near 0 behind any lens."""
+    power = fit.coherent.sum(axis=0)
+    fine, middle = (
+        power[int(FINE_FROM * len(power)) :],
+        power[int(MIDDLE[0] * len(power)) : int(MIDDLE[1] * len(power))],
+    )
+    return float(fine.mean() / max(float(middle.mean()), TINY))

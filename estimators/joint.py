@@ -11,16 +11,15 @@ al., arXiv 1602.01541 (2016), for N frames on a line.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.positions import coherent_power, motion_basis, position_scores
+from axialnav.estimators.products import Products
 from axialnav.estimators.spectrum import Band, pair_count
 from axialnav.estimators.texture import blur_power, matched_weight, shape_family, smooth_noise, texture_power
-from axialnav.estimators.products import Products
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
@@ -28,6 +27,7 @@ MAX_STEP_PX = 0.3
 STEPS = 4
 TOLERANCE_PX = 1e-4
 PRIOR_DOF = 6.0
+BENDS_PX = tuple(0.125 * k for k in range(-16, 17))
 NOISE_FLOOR, TINY = 1e-3, 1e-12
 WINDOW_VARIANCE = 1.6
 
@@ -48,6 +48,8 @@ class Fit:
         ``sum_f w Re E`` per strip and pair, shape (s, p).
     texture, noise, weight
         Power per row and frame, and the weights used, shape (c, f).
+    coherent
+        Raw power that moves as fitted, noise taken off, shape (c, f).
     """
 
     motion: Array
@@ -58,24 +60,26 @@ class Fit:
     texture: Array
     noise: Array
     weight: Array
+    coherent: Array
 
 
-def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[Array, Array]:
-    """Smooth texture and noise power per row and frame, shape (c, f), from the coherent part at these positions."""
+def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[Array, Array, Array]:
+    """Smooth texture, smooth noise and raw coherent power per row and frame at these positions, shape (c, f) each."""
     frames, rows, band = products.frames, products.rows.sum(axis=0), products.band
     omega = 2.0 * np.pi * band.frequency()
     shapes = shape_family(band.first, band.count, band.length) * blur_power(blur_px, band.frequency())
     re, im, power = products.re.sum(axis=0), products.im.sum(axis=0), products.power.sum(axis=0, dtype=np.float64)
     pairs = np.empty(band.count)
-    texture, noise = np.empty_like(power), np.empty_like(power)
+    texture, noise, coherent_part = np.empty_like(power), np.empty_like(power), np.empty_like(power)
     for c in range(len(rows)):
         mean_power = power[c] / (frames * rows[c])
         coherent_power(re[c], im[c], omega, position_px, pairs)
         coherent = mean_power / frames + 2.0 * pairs / (frames**2 * rows[c])
         incoherent = (mean_power - coherent) * frames / (frames - 1)
         noise[c] = smooth_noise(incoherent, NOISE_FLOOR * float(mean_power.mean()) + TINY)
+        coherent_part[c] = coherent - noise[c] / frames
         texture[c] = texture_power(coherent, noise[c] / frames, int(rows[c]), shapes)
-    return texture, noise
+    return texture, noise, coherent_part
 
 
 def evaluate(re: Plane, im: Plane, band: Band, position_px: Array) -> tuple[Array, Array, Array]:
@@ -110,7 +114,7 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
     motion = np.array(start, dtype=np.float64)
     for _ in range(passes):
         position = basis @ motion - products.offset_px
-        texture, noise = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
+        texture, noise, coherent = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
         weight = matched_weight(texture, noise, products.frames)
         re, im = products.weighted(weight)
         for _ in range(STEPS):
@@ -124,7 +128,7 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
             if float(np.abs(step).max()) < TOLERANCE_PX:
                 break
     covariance = sandwich(score @ basis, J)
-    return Fit(motion, covariance, score, information, coherence, texture, noise, weight)
+    return Fit(motion, covariance, score, information, coherence, texture, noise, weight, coherent)
 
 
 def sandwich(score: Array, J: Array) -> Array:
@@ -152,6 +156,14 @@ def sandwich(score: Array, J: Array) -> Array:
     return np.asarray(inverse @ middle @ inverse)
 
 
-def sigma_of(fit: Fit) -> float:
-    """Standard deviation of the displacement [px]."""
-    return math.sqrt(float(fit.covariance[0, 0]))
+def best_bend(products: Products, fit: Fit) -> float:
+    """Change of the displacement per frame [px] from a coarse look around a fit without one."""
+    basis = motion_basis(products.frames, True)
+    re, im = (plane.sum(axis=0, dtype=np.float64) for plane in products.weighted(fit.weight))
+    omega, pairs = 2.0 * np.pi * products.band.frequency(), np.empty(products.band.count)
+
+    def gain(bend: float) -> float:
+        coherent_power(re, im, omega, basis @ np.array([fit.motion[0], bend]) - products.offset_px, pairs)
+        return float(pairs.sum())
+
+    return max(BENDS_PX, key=gain)

@@ -9,10 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.integrity import Choice, choose
+from axialnav.estimators.drift import cross_or_nan
+from axialnav.estimators.evenness import (
+    SURE_BEND,
+    Residual,
+    bend_significance,
+    residual,
+    shake_variance,
+    stranger,
+    uneven,
+)
+from axialnav.estimators.integrity import (
+    MAX_LOST_STRIPS,
+    MAX_WHITENESS,
+    STATIC_PX,
+    Choice,
+    choose,
+    disturbed,
+    quarrelling,
+    whiteness,
+)
+from axialnav.estimators.joint import Fit, best_bend, fit_motion
 from axialnav.estimators.layout import STRIPS
 from axialnav.estimators.products import Products
-from axialnav.estimators.joint import Fit, fit_motion, sigma_of
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.search import STEP_PX, Profiles, lag_sums, profiles, unrelated_spread
 from axialnav.estimators.texture import matched_weight, shape_family, texture_power
@@ -43,12 +62,15 @@ class JointOptions:
         filter may pass its own prediction without counting it twice.
     consensus
         Ask the row bands one by one.
+    evenness
+        Refuse windows in which a frame was dropped or repeated.
     """
 
     frame_period_s: float
     exposure_s: float | None = None
     prior_px: tuple[float, float] | None = None
     consensus: bool = True
+    evenness: bool = True
 
     @property
     def exposure_ratio(self) -> float:
@@ -98,35 +120,84 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     """
     frames = len(window.order)
     span_s = (frames - 1) * options.frame_period_s
-
-    def refuse(reason: str, bands: tuple[int, int] = (0, 0)) -> MotionEstimate:
-        return refused(reason, signed=True, window_s=span_s, method="joint", bands=bands)
-
     grid = search_grid(window.band.length, frames, options.prior_px)
     found = search(window.fixed(), grid)
     choice = choose(found, options.consensus)
-    asked = (int(choice.agree.sum()), BANDS)
+    votes = (int(choice.agree.sum()), BANDS)
     reason = doubt_search(found, choice, options)
     if reason:
-        return refuse(reason, asked)
-    fit = _follow(window, float(grid[choice.index]), choice, options)
-    if fit is None:
-        return refuse(MotionReason.AMBIGUOUS, asked)
-    sigma = sigma_of(fit)
-    if not sigma <= MAX_SIGMA_PX:
-        return refuse(MotionReason.SIGMA, asked)
-    return MotionEstimate(float(fit.motion[0]), sigma, math.nan, True, MotionReason.GOOD, True, span_s, bands=asked)
-
-
-def _follow(window: FrameWindow, start_px: float, choice: Choice, options: JointOptions) -> Fit | None:
+        return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
+    start_px = float(grid[choice.index])
+    drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
+    products = window.following(start_px, drift.cross_px)
     strips = np.repeat(choice.agree, STRIPS // BANDS)
-    products = window.following(start_px).selected(strips)
-    return fit_motion(products, np.array([start_px]), options.exposure_ratio)
+    fit, lost = fit_strips(products.selected(strips), start_px, options)
+    if lost + int(np.sum(~strips)) > MAX_LOST_STRIPS:
+        return refused(MotionReason.BANDS, signed=True, window_s=span_s, method="joint", bands=votes)
+    left = residual(fit) if fit is not None else None
+    reason = doubt_fit(fit, left, products, options)
+    if fit is None or left is None or reason:
+        return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
+    return MotionEstimate(
+        float(fit.motion[0]),
+        math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames)),
+        cross_or_nan(drift),
+        True,
+        MotionReason.GOOD,
+        True,
+        span_s,
+        acceleration_px=float(fit.motion[1]) if len(fit.motion) == 2 else 0.0,
+        bands=votes,
+    )
+
+
+def fit_strips(products: Products, start_px: float, options: JointOptions) -> tuple[Fit | None, int]:
+    """Fit, leave out strips that are disturbed or quarrel with the others, fit again; also how many were left out."""
+    fit = fit_frames(products, start_px, options)
+    lost = 0
+    for doubt in (disturbed, quarrelling):
+        if fit is None or not options.consensus:
+            break
+        bad = doubt(fit, products)
+        lost += int(bad.sum())
+        if lost > MAX_LOST_STRIPS:
+            break
+        if bad.any():
+            products = products.selected(~bad)
+            fit = fit_frames(products, float(fit.motion[0]), options)
+    return fit, lost
+
+
+def fit_frames(products: Products, start_px: float, options: JointOptions) -> Fit | None:
+    """Displacement alone, then with an acceleration if that is significant."""
+    fit = fit_motion(products, np.array([start_px]), options.exposure_ratio)
+    if fit is None or bend_significance(fit) < SURE_BEND:
+        return fit
+    start = np.array([float(fit.motion[0]), best_bend(products, fit)])
+    return fit_motion(products, start, options.exposure_ratio) or fit
+
+
+def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, options: JointOptions) -> str:
+    """Why the fit is not believed; "" if it is."""
+    if fit is None or left is None:
+        return MotionReason.AMBIGUOUS
+    if options.evenness and stranger(fit, products.rows.sum(axis=0)):
+        return MotionReason.PAIR
+    if options.evenness and uneven(fit, left):
+        return MotionReason.UNEVEN
+    if abs(float(fit.motion[0])) < STATIC_PX and whiteness(fit) > MAX_WHITENESS:
+        return MotionReason.STATIC
+    if not math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, products.frames)) <= MAX_SIGMA_PX:
+        return MotionReason.SIGMA
+    return ""
 
 
 def doubt_search(found: Profiles, choice: Choice, options: JointOptions) -> str:
     """Why the search alone already refuses; "" if it does not."""
     if int(choice.agree.sum()) < ENOUGH_BANDS:
+        return MotionReason.BANDS
+    near_zero = abs(float(found.grid_px[choice.index])) < STATIC_PX
+    if near_zero and int(choice.opposed.sum()) > 1:
         return MotionReason.BANDS
     if found.significance(choice.index, choice.agree) < MIN_SIGNIFICANCE:
         return MotionReason.AMBIGUOUS

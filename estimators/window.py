@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.drift import DriftMeter
 from axialnav.estimators.frames import Image
 from axialnav.estimators.layout import STRIPS, RowLayout, haar_rows
 from axialnav.estimators.products import Products
@@ -47,6 +48,7 @@ class FrameWindow:
         self._power = np.zeros((frames, groups, count), dtype=np.float32)
         self._pair_re = np.zeros((frames, frames, groups, count), dtype=np.float32)
         self._pair_im = np.zeros_like(self._pair_re)
+        self.drift = DriftMeter(height, width, frames)
         self.order: list[int] = []
 
     def clear(self) -> None:

@@ -1,0 +1,103 @@
+"""Whether the frames fit one smooth motion: residual positions of the frames, and pairs that do not belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
+from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.spectrum import pair_frames
+
+Array = NDArray[np.float64]
+SURE_BEND = 14.0
+CHI2_OFFSET, CHI2_PER_DOF = 16.0, 3.5  # about 1e-5 for one to six degrees of freedom
+UNEVEN_SHARE, UNEVEN_PX = 0.03, 0.02
+MIN_PAIR_SHARE = 0.3
+SURE_PAIR = 4.0
+DROP_LIKE_BEND = 0.5
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Positions of single frames that the motion does not explain.
+
+    Parameters
+    ----------
+    chi2
+        Size in units of their noise, squared and summed [-].
+    dof
+        Degrees of freedom; 0 where the motion explains any position.
+    rms_px
+        Root mean square per degree of freedom [px].
+    """
+
+    chi2: float
+    dof: int
+    rms_px: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether noise alone would hardly do this."""
+        return self.dof > 0 and self.chi2 > CHI2_OFFSET + CHI2_PER_DOF * self.dof
+
+
+def bend_significance(fit: Fit) -> float:
+    """Score test of an acceleration at a fit without one: squared, in units of its variance [-]."""
+    frames = fit.score.shape[1]
+    if frames < 3 or len(fit.motion) != 1:
+        return 0.0
+    basis = motion_basis(frames, True)
+    J = basis.T @ fit.information.sum(axis=0) @ basis
+    g = basis.T @ fit.score.sum(axis=0)
+    bend = g[1] - J[1, 0] / J[0, 0] * g[0]
+    room = J[1, 1] - J[1, 0] ** 2 / J[0, 0]
+    return float(bend**2 / (room * WINDOW_VARIANCE)) if room > 0.0 else 0.0
+
+
+def residual(fit: Fit) -> Residual:
+    """One Gauss-Newton step with every frame free: what is left beside the motion."""
+    frames, fitted = fit.score.shape[1], len(fit.motion)
+    dof = frames - 1 - fitted
+    if dof < 1:
+        return Residual(0.0, 0, 0.0)
+    known = np.column_stack([np.ones(frames), motion_basis(frames, fitted == 2)])
+    free = np.linalg.svd(known.T)[2][known.shape[1] :].T
+    whole = np.column_stack([known[:, 1:], free])
+    J = whole.T @ fit.information.sum(axis=0) @ whole
+    if float(np.linalg.eigvalsh(J)[0]) <= 0.0:
+        return Residual(np.inf, dof, np.inf)
+    covariance = np.linalg.inv(J)
+    step = (covariance @ (whole.T @ fit.score.sum(axis=0)))[fitted:]
+    chi2 = float(step @ np.linalg.solve(covariance[fitted:, fitted:], step)) / WINDOW_VARIANCE
+    return Residual(chi2, dof, float(np.sqrt(step @ step / dof)))
+
+
+def uneven(fit: Fit, left: Residual) -> bool:
+    """Whether the residual positions are those of a dropped or repeated frame rather than of a shaking camera."""
+    if left.dof == 0 and len(fit.motion) == 2:
+        return bool(abs(fit.motion[1]) > DROP_LIKE_BEND * abs(fit.motion[0]))
+    return left.significant and left.rms_px > UNEVEN_SHARE * abs(float(fit.motion[0])) + UNEVEN_PX
+
+
+def shake_variance(left: Residual, frames: int) -> float:
+    """Variance that residual positions add to the displacement, ``12 s^2 / (N (N^2 - 1))`` [px^2]."""
+    return 12.0 * left.rms_px**2 / (frames * (frames**2 - 1)) if left.significant else 0.0
+
+
+def stranger(fit: Fit, rows: Array) -> bool:
+    """Whether a pair of neighbouring frames has almost nothing in common although the others have.
+
+    ``rows`` (c,) are the rows behind the sums of all strips in use.
+    """
+    frames = fit.score.shape[1]
+    if frames < 3:
+        return False
+    pairs = pair_frames(frames)
+    neighbours = fit.coherence.sum(axis=0)[pairs[:, 1] - pairs[:, 0] == 1]
+    usual, least = float(np.median(neighbours)), float(neighbours.min())
+    total = fit.texture + fit.noise
+    variance = float(np.sum(rows[:, None] * fit.weight**2 * (total**2 + fit.texture**2)) / 2.0)
+    return least < MIN_PAIR_SHARE * usual and usual - least > SURE_PAIR * np.sqrt(WINDOW_VARIANCE * variance)
