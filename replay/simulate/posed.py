@@ -147,8 +147,20 @@ def posed_light(plane: WallPlane, camera: CameraModel, poses: Poses) -> Image:
     to_sample = np.array([[OVERSAMPLING, 0.0, -OVERSAMPLING * start[0]], [0.0, 1.0, -start[1]], [0.0, 0.0, 1.0]])
     for rows, (maps, weights) in zip(bounds, exposures, strict=True):
         expose_plane(light, to_sample @ maps, weights, rows.start, OVERSAMPLING, raw[rows])
-    filtered = cv2.sepFilter2D(raw, cv2.CV_32F, row_taps(camera.lens_sigma_px, OVERSAMPLING), _column(camera))
-    return np.ascontiguousarray(filtered[:, ::OVERSAMPLING])
+    return _decimated(raw, row_taps(camera.lens_sigma_px, OVERSAMPLING), _column(camera))
+
+
+def _decimated(raw: Image, taps: NDArray[np.float32], column: NDArray[np.float32]) -> Image:
+    """Filter rows and columns and keep every second sample of a row, computing only what is kept."""
+    centre, parts = len(taps) // 2, []
+    for phase in range(OVERSAMPLING):  # samples 2 u + phase + 2 j meet the taps centre + phase + 2 j
+        reach = (centre - phase) // OVERSAMPLING + phase
+        offsets = phase + OVERSAMPLING * np.arange(-reach, reach + 1)
+        index = centre + offsets
+        part = np.where((index >= 0) & (index < len(taps)), taps[np.clip(index, 0, len(taps) - 1)], np.float32(0.0))
+        samples = np.ascontiguousarray(raw[:, phase::OVERSAMPLING])
+        parts.append(cv2.sepFilter2D(samples, cv2.CV_32F, part, column, borderType=cv2.BORDER_REPLICATE))
+    return np.asarray(sum(parts[1:], start=parts[0]), dtype=np.float32)
 
 
 def _exposure(plane: WallPlane, camera: CameraModel, poses: Poses, delay_s: float) -> tuple[Array, NDArray[np.float32]]:
