@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from axialnav.fusion.outcome import Verdict as Verdict
     from axialnav.fusion.readings import Attitude as Attitude
     from axialnav.fusion.readings import BlurLength as BlurLength
+    from axialnav.fusion.readings import CameraFrame as CameraFrame
     from axialnav.fusion.readings import Height as Height
     from axialnav.fusion.readings import ImuSample as ImuSample
     from axialnav.fusion.readings import PixelMotion as PixelMotion
@@ -82,6 +83,7 @@ _HOME = {
     "axialnav.fusion.readings": (
         "Attitude",
         "BlurLength",
+        "CameraFrame",
         "Height",
         "ImuSample",
         "PixelMotion",

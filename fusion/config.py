@@ -141,6 +141,13 @@ class FlowTuning(_Table, frozen=True, kw_only=True):
     gate: Gate = Gate(soft_sigma=3.0)
 
 
+class CameraTuning(_Table, frozen=True, kw_only=True):
+    """How camera frames become pixel motion: ``frames`` neighbours at a time, by the named method."""
+
+    frames: Annotated[int, msgspec.Meta(ge=2, le=32)] = 5
+    method: str = "joint"
+
+
 class RangeTuning(_Table, frozen=True, kw_only=True):
     """Noise of wall and floor ranges."""
 
@@ -196,6 +203,7 @@ class Config(_Table, frozen=True, kw_only=True):
     imu_fault: ImuFault = ImuFault()
     uwb: UwbTuning = UwbTuning()
     flow: FlowTuning = FlowTuning()
+    camera: CameraTuning = CameraTuning()
     range: RangeTuning = RangeTuning()
     height: HeightTuning = HeightTuning()
     attitude: AttitudeTuning = AttitudeTuning()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.alignment import align
+from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import AxialnavError
 from axialnav.fusion.events import Events
@@ -31,7 +32,7 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
 from axialnav.fusion.packing import Packer
-from axialnav.fusion.readings import Reading
+from axialnav.fusion.readings import CameraFrame, Reading
 from axialnav.fusion.sources import Kind, build_sources
 from axialnav.models.state import (
     ACCEL_BIAS,
@@ -71,6 +72,7 @@ class CorridorEstimator:
     def __init__(self, config: Config | None = None) -> None:
         self.config = config or Config()
         self._packer = Packer(self.config)
+        self._cameras = CameraFeed(self.config)
         self._sources = build_sources(self.config)
         self._settings = build_settings(self.config)
         self._scratch = new_scratch()
@@ -88,9 +90,14 @@ class CorridorEstimator:
         ------
         ReadingError
             The reading does not belong to a configured sensor.
+        FrameError
+            A camera frame cannot be used.
         FlightError
             The first samples cannot start a filter.
         """
+        if isinstance(reading, CameraFrame):
+            motion = self._cameras.push(reading)
+            return self.push(motion) if motion is not None else self._record(reading, Reason.NO_MOTION)
         source, values = self._packer.pack(reading)
         kind = self._sources["kind"][source]
         if not self._sources["enabled"][source]:

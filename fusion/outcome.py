@@ -38,6 +38,7 @@ class Reason(IntEnum):
     UNKNOWN_ANCHOR = 10
     ALIGNING = 11
     DISABLED = 12
+    NO_MOTION = 13
 
 
 REASONS: dict[Reason, str] = {
@@ -54,6 +55,7 @@ REASONS: dict[Reason, str] = {
     Reason.UNKNOWN_ANCHOR: "the anchor is not in the sensor's list",
     Reason.ALIGNING: "held until the first state is known, then processed",
     Reason.DISABLED: "the source is switched off",
+    Reason.NO_MOTION: "the frames so far give no displacement that can be believed",
 }
 
 
@@ -192,7 +194,7 @@ def verdict_of(reason: Reason) -> Verdict:
         return Verdict.GATED
     if reason is Reason.TOO_OLD:
         return Verdict.LATE
-    if reason in {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT, Reason.ALIGNING}:
+    if reason in {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT, Reason.ALIGNING, Reason.NO_MOTION}:
         return Verdict.BLIND
     if reason is Reason.SUPERVISOR:
         return Verdict.SUSPECT

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from axialnav.fusion.errors import ReadingError
 
@@ -82,6 +84,25 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
         if self.dy_px is not None:
             self._finite("dy_px", self.dy_px, -1e5, 1e5)
         _sigma(self, "sigma_px", self.sigma_px)
+
+
+class CameraFrame(Reading, frozen=True, kw_only=True, eq=False):
+    """One picture of a wall, stamped at the middle of its exposure; uint8 or uint16, grey (H, W) or colour (H, W, 3).
+
+    The estimator turns neighbouring frames into pixel motion itself; ``exposure_s`` None means the camera's own value.
+    """
+
+    image: NDArray[np.generic]
+    exposure_s: float | None = None
+
+    def __post_init__(self) -> None:
+        self._stamp()
+        shape = getattr(self.image, "shape", None)
+        self._require(
+            shape is not None and len(shape) in (2, 3), "image", shape, "an array of shape (H, W) or (H, W, C)"
+        )
+        if self.exposure_s is not None:
+            self._finite("exposure_s", self.exposure_s, 0.0, 10.0)
 
 
 class BlurLength(Reading, frozen=True, kw_only=True):

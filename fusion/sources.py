@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincinv
 
+from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.config import Config, Gate
 from axialnav.fusion.errors import ConfigError
 from axialnav.models.rig import (
@@ -65,13 +65,8 @@ SOURCE = np.dtype(
 )
 
 
-def chi_square_threshold(dof: int, probability: float) -> float:
-    """Value that a chi-square variable with ``dof`` degrees of freedom stays below with ``probability``."""
-    return float(2.0 * gammaincinv(0.5 * dof, probability))
-
-
 def kind_of(spec: AnySensor) -> Kind | None:
-    """Event kind of a sensor, or None for sensors that are not fused themselves (cameras, GPS)."""
+    """Event kind of a sensor, or None for sensors that are not fused (GPS, cameras that name no surface)."""
     match spec:
         case Uwb(measurement=measurement):
             return {"range": Kind.UWB_RANGE, "tdoa": Kind.UWB_TDOA, "position": Kind.UWB_POSITION}[measurement]
@@ -79,7 +74,7 @@ def kind_of(spec: AnySensor) -> Kind | None:
             return Kind.IMU
         case RangeFinder():
             return Kind.RANGE
-        case Flow():
+        case Flow() | Camera(surface=str()):
             return Kind.FLOW
         case BlurMeter(signed=signed):
             return Kind.FLOW if signed else Kind.BLUR
@@ -137,8 +132,8 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         "high": np.inf,
         "anchors": [],
     }
-    if isinstance(spec, Flow | BlurMeter | RangeFinder):
-        surface = _surface(name, spec.surface, config)
+    if isinstance(spec, Flow | BlurMeter | RangeFinder | Camera):
+        surface = _surface(name, spec.surface or "", config)
         known = surface.offset_m != "unknown"
         row |= {
             "normal_W": surface.normal,
@@ -147,6 +142,8 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         }
     if isinstance(spec, Flow | BlurMeter):
         row |= {"focal_px": spec.focal_px, "low": config.flow.min_quality}
+    if isinstance(spec, Camera):
+        row["focal_px"] = spec.focal_px
     if isinstance(spec, RangeFinder):
         row |= {"low": spec.range_min_m, "high": spec.range_max_m}
     if isinstance(spec, Uwb):
@@ -174,7 +171,7 @@ def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:
             return max(claim or 0.0, floor), config.uwb.gate  # receivers claim too little, never too much
         case Flow(sigma_px=sigma, focal_px=focal):
             return sigma or config.flow.sigma_rad * max(focal), config.flow.gate
-        case BlurMeter(focal_px=focal):
+        case BlurMeter(focal_px=focal) | Camera(focal_px=focal):
             return config.flow.sigma_rad * max(focal), config.flow.gate
         case RangeFinder(sigma_m=sigma):
             return sigma or config.range.sigma_m, config.range.gate
@@ -182,5 +179,5 @@ def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:
             return sigma or config.height.sigma_m, config.height.gate
         case AttitudeSource(sigma_rad=sigma):
             return sigma or config.attitude.sigma_rad, config.attitude.gate
-        case Imu() | Camera() | _:
+        case _:
             return 1.0, Gate()

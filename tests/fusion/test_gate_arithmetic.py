@@ -8,7 +8,8 @@ from scipy.stats import chi2
 
 from axialnav.fusion.config import Config, Gate, UwbTuning
 from axialnav.fusion.kernels.update import redescend, repetition
-from axialnav.fusion.sources import build_sources, chi_square_threshold
+from axialnav.fusion.chi_square import chi_square_threshold
+from axialnav.fusion.sources import build_sources
 from axialnav.models.rig import Imu, Uwb
 
 

@@ -1,0 +1,59 @@
+"""Camera frames on their way into the filter: neighbouring frames become pixel motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.errors import ReadingError
+from axialnav.fusion.readings import CameraFrame, PixelMotion
+from axialnav.models.rig import Camera
+
+if TYPE_CHECKING:
+    from axialnav.estimators.streaming import MotionEstimator
+
+
+class CameraFeed:
+    """One image-motion estimator per camera that looks at a described surface."""
+
+    def __init__(self, config: Config) -> None:
+        self._cameras: dict[str, MotionEstimator] = {}
+        self._periods = config.camera.frames - 1
+        for name, spec in config.sensor.items():
+            if isinstance(spec, Camera) and spec.surface is not None:
+                self._cameras[name] = _motion_estimator(spec, config)
+
+    def push(self, frame: CameraFrame) -> PixelMotion | None:
+        """Pixel motion of the window that ``frame`` completes, or None where there is none to be believed.
+
+        The displacement is per frame period and a mean over the window, at whose middle it is stamped.
+
+        Raises
+        ------
+        ReadingError
+            The camera is not configured with a surface.
+        FrameError
+            The picture cannot be used or its stamp does not follow the previous one.
+        """
+        if frame.sensor not in self._cameras:
+            known = ", ".join(self._cameras) or "none"
+            raise ReadingError(
+                f"no camera named {frame.sensor!r} looks at a surface; there are {known}; "
+                f'describe it as [sensor.{frame.sensor}] with kind = "camera" and surface'
+            )
+        estimate = self._cameras[frame.sensor].push(frame.t_ns, frame.image, frame.exposure_s)
+        if estimate is None or not estimate.accepted or estimate.t_ns is None:
+            return None
+        return PixelMotion(
+            t_ns=estimate.t_ns,
+            sensor=frame.sensor,
+            window_s=estimate.window_s / self._periods,
+            dx_px=estimate.displacement_px,
+            sigma_px=estimate.sigma_px,
+        )
+
+
+def _motion_estimator(camera: Camera, config: Config) -> MotionEstimator:
+    from axialnav.estimators.streaming import MotionEstimator  # brings OpenCV, which vehicles without camera can spare
+
+    return MotionEstimator(camera, frames=config.camera.frames, method=config.camera.method)

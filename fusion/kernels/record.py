@@ -1,0 +1,94 @@
+"""The forward pass of the smoother: the filter's own kernel, event by event, with what the way back needs kept.
+
+A whole flight of covariances would not fit into memory.  The first pass keeps the filter's memory at cuts only; on the
+way back each stretch between two cuts is run again, recorded and smoothed.  A filter that is a pure function gives the
+same bits both times.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.kernels.rival import copy_filter
+from axialnav.fusion.kernels.run import run
+from axialnav.fusion.kernels.smooth import IDENTITY, INERTIAL, REANCHORING
+from axialnav.models.imu import strapdown
+from axialnav.models.jit import Record, Records, kernel
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@kernel
+def advance(
+    start: int, wanted: int, t_ns: Ints, source: Ints, values: Array, sources: Records, core: Records,
+    memory: Records, scratch: Records, settings: Records, track: Array, log: Array,
+) -> int:  # fmt: skip
+    """Run ``wanted`` events or more from ``start``, up to where a cut does no harm; return the end.
+
+    Cuts lie right after an inertial sample at which no trial of the rival is under way: a trial that ends well
+    replaces the estimate since its beginning, so both must be in one stretch.
+    """
+    m, rows = core[0], 0
+    for e in range(start, t_ns.shape[0]):
+        one = slice(e, e + 1)
+        rows += run(
+            t_ns[one], source[one], values[one], sources, core, memory, scratch, settings, track[rows:], log[one]
+        )
+        inertial = sources[source[e]].kind == 0
+        if inertial and e + 1 - start >= wanted and (m.on_trial == 0 or m.t_trial == m.t_imu):
+            return e + 1
+    return int(t_ns.shape[0])
+
+
+@kernel
+def record(
+    start: int, stop: int, t_ns: Ints, source: Ints, values: Array, sources: Records, core: Records,
+    memory: Records, scratch: Records, settings: Records, track: Array, log: Array, imu: Array, steps: Records,
+) -> int:  # fmt: skip
+    """Run the events ``start:stop`` and write a row of ``steps`` per step; return their number.
+
+    ``track`` (1, 45) and ``log`` (1, 10) are overwritten by each event; ``imu`` (6,) is scratch.
+    """
+    m, w, c = core[0], scratch[0], settings[0]
+    n, rows, trial_from = 0, 0, 0
+    for e in range(start, stop):
+        s = steps[n]
+        fault, resets, t_before, started, pair = m.imu_fault, m.resets, m.t_imu, m.started, 1 + m.on_trial
+        for k in range(6):
+            imu[k] = m.imu[k]
+        for row in range(pair):
+            copy_filter(m.x[row], m.P[row], s.x_before[row], s.P_before[row])
+        one = slice(e, e + 1)
+        run(t_ns[one], source[one], values[one], sources, core, memory, scratch, settings, track, log)
+        if sources[source[e]].kind == 0:
+            s.dt = (m.t_imu - t_before) * 1e-9 if started == 1 else 0.0
+            s.kind = INERTIAL if s.dt > 0.0 else IDENTITY
+            s.track_row = rows
+            rows += 1
+        elif m.resets != resets:
+            s.dt, s.kind, s.track_row = 0.0, REANCHORING, -1
+        else:
+            continue
+        for row in range(pair):
+            copy_filter(m.x[row], m.P[row], s.x_after[row], s.P_after[row])
+            if s.kind == INERTIAL:
+                _transition(s, row, imu, m, w, c)
+        s.chosen = 0
+        n += 1
+        if m.imu_fault != fault:
+            for k in range(trial_from, n):
+                steps[k].chosen = 1
+        if m.on_trial == 1 and s.kind == INERTIAL and m.t_trial == m.t_imu:
+            trial_from = n
+    return n
+
+
+@kernel
+def _transition(s: Record, row: int, imu: Array, m: Record, w: Record, c: Record) -> None:
+    """Blocks of the transition of filter ``row`` over the step that ``s`` describes."""
+    for k in range(6):
+        w.mean_imu[k] = 0.5 * (imu[k] + m.imu[k])
+    x = s.x_before[row].copy()
+    strapdown(x, w.mean_imu[0:3], w.mean_imu[3:6], s.dt, c.gravity_m_s2, w.R, s.F[row])

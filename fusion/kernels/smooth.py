@@ -1,0 +1,274 @@
+r"""Rauch-Tung-Striebel smoothing of the error state: one step back over an inertial interval or a re-anchoring.
+
+With the filter's state and covariance before (+) and after (-) a step and its transition,
+
+.. math::
+    C_k = P^+_k \Phi^\top (P^-_{k+1})^{-1}, \qquad
+    \delta_k = C_k\,(x^s_{k+1} \ominus x^-_{k+1}), \qquad
+    P^s_k = P^+_k + C_k\,(P^s_{k+1} - P^-_{k+1})\,C_k^\top .
+
+Attitudes are subtracted and added on the group, and covariances are carried between the tangent spaces.  Re-anchoring
+is the step that forgets the position: everything but the position passes through it.
+
+Source: Rauch, Tung, Striebel (1965); Sarkka (2013), section 9.1; for the attitude Sola (2017), section 6.3.1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.memory import TRACK_POS_CROSS, TRACK_STATE, TRACK_VARIANCE, TRACK_VEL_CROSS
+from axialnav.models.jit import Record, Records, kernel
+from axialnav.models.rotations import rotate_in_body
+from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, E_VEL, N_ERROR, N_NOMINAL, QUAT
+from axialnav.models.tangent import inverse_right_jacobian, right_jacobian, rotation_between
+
+Array = NDArray[np.float64]
+N = 18
+IDENTITY, INERTIAL, REANCHORING = 0, 1, 2
+MIN_PIVOT = 1e-13  # of a correlation matrix: directions below are known exactly and stay as they are
+
+STEP: Final = np.dtype(
+    [
+        ("kind", "i8"),
+        ("chosen", "i8"),  # which of the two filters became the estimate
+        ("track_row", "i8"),  # -1 where the step ends at no inertial sample
+        ("dt", "f8"),
+        ("x_before", "f8", (2, N_NOMINAL)),
+        ("P_before", "f8", (2, N_ERROR, N_ERROR)),
+        ("x_after", "f8", (2, N_NOMINAL)),
+        ("P_after", "f8", (2, N_ERROR, N_ERROR)),
+        ("F", "f8", (2, 9, 3)),
+    ],
+    align=True,
+)
+
+WORK: Final = np.dtype(
+    [
+        ("x", "f8", N_NOMINAL),  # smoothed state, and below its covariance about itself
+        ("P", "f8", (N_ERROR, N_ERROR)),
+        ("D", "f8", (N_ERROR, N_ERROR)),
+        ("U", "f8", (N_ERROR, N_ERROR)),
+        ("X", "f8", (N_ERROR, N_ERROR)),
+        ("T", "f8", (N_ERROR, N_ERROR)),
+        ("delta", "f8", N_ERROR),
+        ("back", "f8", N_ERROR),
+        ("scale", "f8", N_ERROR),
+        ("inverse", "f8", N_ERROR),
+        ("J", "f8", (3, 3)),
+        ("r", "f8", 3),
+    ],
+    align=True,
+)
+
+
+@kernel
+def smooth_back(steps: Records, n: int, work: Records, c: Record, track: Array) -> None:
+    """Go back over ``steps[:n]`` from the smoothed state in ``work``, which ends up before the first of them.
+
+    Rows of ``track`` that belong to inertial samples are overwritten; flags and reset counts stay the filter's.
+    """
+    w = work[0]
+    for j in range(n - 1, -1, -1):
+        s = steps[j]
+        if s.track_row >= 0:
+            write_smoothed(w.x, w.P, track[s.track_row])
+        if s.kind == IDENTITY:
+            continue
+        r = s.chosen
+        decay = math.exp(-s.dt / c.uwb_bias_time_s)
+        if s.kind == INERTIAL:
+            transition_times(s.P_before[r], s.F[r], s.dt, decay, w.X)
+        else:
+            _forget_position(s.P_before[r], w.X)
+        _step_back(s.x_before[r], s.P_before[r], s.x_after[r], s.P_after[r], w)
+
+
+@kernel
+def _step_back(x_before: Array, P_before: Array, x_after: Array, P_after: Array, w: Record) -> None:
+    """One step; ``w.X`` holds the transition times ``P_before`` on entry."""
+    _subtract(w.x, x_after, w.delta)
+    for k in range(3):
+        w.r[k] = w.delta[E_ATT + k]
+    inverse_right_jacobian(w.r, w.J)
+    carry(w.P, w.J, w.D)
+    for i in range(N):
+        for j in range(N):
+            w.D[i, j] -= P_after[i, j]
+    factorise(P_after, w.scale, w.inverse, w.U)
+    solve(w.U, w.scale, w.inverse, w.X)
+    for i in range(N):
+        w.back[i] = 0.0
+    for k in range(N):
+        for i in range(N):
+            w.back[i] += w.X[k, i] * w.delta[k]
+    _add_quadratic(P_before, w.X, w.D, w.T, w.P)
+    _add(x_before, w.back, w.x)
+    for k in range(3):
+        w.r[k] = w.back[E_ATT + k]
+    right_jacobian(w.r, w.J)
+    carry(w.P, w.J, w.T)
+    for i in range(N):
+        for j in range(N):
+            w.P[i, j] = w.T[i, j]
+
+
+@kernel
+def transition_times(P: Array, F: Array, dt: float, decay: float, out: Array) -> None:
+    """Write ``Phi P`` (18, 18) into ``out``; the blocks are those of :func:`axialnav.models.imu.strapdown`."""
+    for j in range(N):
+        for i in range(3):
+            out[i, j] = P[i, j] + dt * P[3 + i, j]
+            out[3 + i, j] = P[3 + i, j]
+            out[6 + i, j] = -dt * P[9 + i, j]
+        for i in range(9, N):
+            out[i, j] = P[i, j]
+        out[E_UWB_BIAS, j] = decay * P[E_UWB_BIAS, j]
+    for i in range(3):
+        for k in range(3):
+            f, b, a = F[i, k], F[3 + i, k], F[6 + i, k]
+            for j in range(N):
+                out[3 + i, j] += f * P[6 + k, j] - b * P[12 + k, j]
+                out[6 + i, j] += a * P[6 + k, j]
+
+
+@kernel
+def _forget_position(P: Array, out: Array) -> None:
+    for i in range(N):
+        for j in range(N):
+            out[i, j] = P[i, j]
+    for i in range(3):
+        for j in range(N):
+            out[E_POS + i, j] = 0.0
+
+
+@kernel
+def carry(P: Array, J: Array, out: Array) -> None:
+    """Write ``P`` with its attitude rows and columns multiplied by ``J`` (3, 3) into ``out``."""
+    for i in range(N):
+        for j in range(N):
+            out[i, j] = P[i, j]
+    for i in range(3):
+        for j in range(N):
+            out[6 + i, j] = J[i, 0] * P[6, j] + J[i, 1] * P[7, j] + J[i, 2] * P[8, j]
+    for i in range(N):
+        a, b, c = out[i, 6], out[i, 7], out[i, 8]
+        for k in range(3):
+            out[i, 6 + k] = a * J[k, 0] + b * J[k, 1] + c * J[k, 2]
+
+
+@kernel
+def factorise(P: Array, scale: Array, inverse: Array, U: Array) -> None:
+    """Cholesky factor of the correlation matrix of ``P`` (18, 18): ``U' U``, upper triangle of ``U``.
+
+    ``scale`` (18,) gets 1 / sigma and ``inverse`` (18,) one over the pivots.  Directions without uncertainty of their
+    own get pivots of zero, so that a semi-definite ``P`` does no harm.  Rows are updated, not entries: adding vectors
+    is faster than adding up products.
+    """
+    for i in range(N):
+        scale[i] = 1.0 / math.sqrt(P[i, i]) if P[i, i] > 0.0 else 0.0
+    for i in range(N):
+        f = scale[i]
+        for j in range(i, N):
+            U[i, j] = f * scale[j] * P[i, j]
+    for i in range(N):
+        pivot = U[i, i]
+        f = 1.0 / math.sqrt(pivot) if pivot > MIN_PIVOT else 0.0
+        inverse[i] = f
+        for j in range(i, N):
+            U[i, j] *= f
+        for k in range(i + 1, N):
+            g = U[i, k]
+            for j in range(k, N):
+                U[k, j] -= g * U[i, j]
+
+
+@kernel
+def solve(U: Array, scale: Array, inverse: Array, X: Array) -> None:
+    """Solve ``P Y = X`` (18, 18) in place with what :func:`factorise` wrote."""
+    for i in range(N):
+        f = scale[i]
+        for j in range(N):
+            X[i, j] *= f
+    for i in range(N):
+        f = inverse[i]
+        for j in range(N):
+            X[i, j] *= f
+        for k in range(i + 1, N):
+            f = U[i, k]
+            for j in range(N):
+                X[k, j] -= f * X[i, j]
+    for i in range(N - 1, -1, -1):
+        for k in range(i + 1, N):
+            f = U[i, k]
+            for j in range(N):
+                X[i, j] -= f * X[k, j]
+        f = inverse[i]
+        for j in range(N):
+            X[i, j] *= f
+    for i in range(N):
+        f = scale[i]
+        for j in range(N):
+            X[i, j] *= f
+
+
+@kernel
+def _add_quadratic(P: Array, X: Array, D: Array, T: Array, out: Array) -> None:
+    """Write ``P + X' D X`` into ``out``, both triangles of it the same; ``T`` is scratch."""
+    for i in range(N):
+        for j in range(N):
+            T[i, j] = 0.0
+            out[i, j] = P[i, j]
+        for k in range(N):
+            f = D[i, k]
+            for j in range(N):
+                T[i, j] += f * X[k, j]
+    for k in range(N):
+        for i in range(N):
+            f = X[k, i]
+            for j in range(i, N):
+                out[i, j] += f * T[k, j]
+    for i in range(N):
+        for j in range(i):
+            out[i, j] = out[j, i]
+
+
+@kernel
+def _subtract(x: Array, base: Array, delta: Array) -> None:
+    """Write the error state (18,) that takes ``base`` (19,) to ``x`` (19,) into ``delta``."""
+    for i in range(6):
+        delta[i] = x[i] - base[i]
+    rotation_between(base[QUAT : QUAT + 4], x[QUAT : QUAT + 4], delta[E_ATT : E_ATT + 3])
+    for i in range(9, N):
+        delta[i] = x[i + 1] - base[i + 1]
+
+
+@kernel
+def _add(base: Array, delta: Array, x: Array) -> None:
+    """Write ``base`` (19,) moved by the error state ``delta`` (18,) into ``x``."""
+    for i in range(N_NOMINAL):
+        x[i] = base[i]
+    for i in range(6):
+        x[i] += delta[i]
+    rotate_in_body(x[QUAT : QUAT + 4], delta[E_ATT], delta[E_ATT + 1], delta[E_ATT + 2])
+    for i in range(9, N):
+        x[i + 1] += delta[i]
+
+
+@kernel
+def write_smoothed(x: Array, P: Array, row: Array) -> None:
+    """Overwrite state and covariance of a track row (layout in :mod:`axialnav.fusion.memory`)."""
+    for i in range(N_NOMINAL):
+        row[TRACK_STATE + i] = x[i]
+    for i in range(N):
+        row[TRACK_VARIANCE + i] = max(P[i, i], 0.0)
+    at = 0
+    for i in range(3):
+        for j in range(i + 1, 3):
+            row[TRACK_POS_CROSS + at] = P[E_POS + i, E_POS + j]
+            row[TRACK_VEL_CROSS + at] = P[E_VEL + i, E_VEL + j]
+            at += 1
