@@ -39,6 +39,7 @@ class Reason(IntEnum):
     ALIGNING = 11
     DISABLED = 12
     NO_MOTION = 13
+    NOT_FINITE = 14
 
 
 REASONS: dict[Reason, str] = {
@@ -55,6 +56,7 @@ REASONS: dict[Reason, str] = {
     Reason.UNKNOWN_ANCHOR: "the anchor is not in the sensor's list",
     Reason.ALIGNING: "held until the first state is known, then processed",
     Reason.DISABLED: "the source is switched off",
+    Reason.NOT_FINITE: "the value, or what the filter expects of it, is not a finite number",
     Reason.NO_MOTION: "the frames so far give no displacement that can be believed",
 }
 

@@ -2,15 +2,22 @@
 
 ``error_model="numpy"`` lets divisions give inf instead of raising (the filter checks its results itself);
 ``fastmath`` stays off because replay must be bit-identical and it brought no speed.
+
+numba keeps compiled code on disk and throws it away when the function's own file changes, but not when a function that
+it calls, in another file, does; and it trips over an index that mentions a type of an older version.  The cache here
+carries a stamp of all source files of the package, and an index that cannot be read counts as empty.
 """
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 import numba
 import numpy as np
+from numba.core.caching import IndexDataCacheFile
 from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -19,8 +26,35 @@ Record: TypeAlias = Any  # one element of a structured array inside a kernel: fi
 Records: TypeAlias = NDArray[np.void]
 Integer: TypeAlias = int | np.int64  # a literal int would be compiled as a constant of its own
 
+_KERNEL_FOLDERS = ("models", "estimators", "estimators/spectral", "fusion", "fusion/kernels")
+
+
+def source_stamp(package: Path) -> tuple[int, int]:
+    """Newest change [ns] and total size [bytes] of the source files that kernels can come from."""
+    files = [f.stat() for folder in _KERNEL_FOLDERS for f in (package / folder).glob("*.py")]
+    return max(f.st_mtime_ns for f in files), sum(f.st_size for f in files)
+
+
+_STAMP = source_stamp(Path(__file__).resolve().parent.parent)
+
+
+class _PackageCacheFile(IndexDataCacheFile):  # type: ignore[misc]
+    """numba's cache file with the stamp of the whole package."""
+
+    def __init__(self, cache_path: str, filename_base: str) -> None:
+        super().__init__(cache_path, filename_base, _STAMP)
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except (AttributeError, ImportError, pickle.PickleError):
+            return {}
+
 
 def kernel(function: F) -> F:
-    """Compile ``function`` to machine code at first use and keep the result on disk."""
-    compiled: F = numba.njit(cache=True, error_model="numpy")(function)
-    return compiled
+    """Compile ``function`` to machine code at first use and keep the result on disk until any source changes."""
+    compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
+    cache = compiled._cache
+    cache._cache_file = _PackageCacheFile(cache._cache_path, cache._impl.filename_base)
+    result: F = compiled
+    return result

@@ -111,7 +111,7 @@ class Truth:
 
     t_ns: Stamps
     position_m: Array
-    quaternion_WB: Array  # noqa: N815  the symbols of the frames keep their case
+    quaternion_WB: Array
     velocity_m_s: Array
     gyro_bias: Array | None = None
     accel_bias: Array | None = None

@@ -21,7 +21,7 @@ from axialnav.fusion.readings import (
     WallRange,
 )
 from axialnav.fusion.sources import fused_sensors
-from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, BlurMeter, Flow, Imu, RangeFinder, Uwb
+from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, BlurMeter, Camera, Flow, Imu, RangeFinder, Uwb
 from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable, Stamps
 
 
@@ -34,6 +34,9 @@ def merge_readings(flight: Flight) -> Iterator[Reading]:
         if kind is not None and name in flight.tables:
             makers.append(_maker(kind, name, flight.tables[name]))
             stamps.append(flight.tables[name].t_ns)
+        elif isinstance(flight.config.sensor[name], Camera) and name in flight.tables:
+            makers.append(_frame_maker(flight, name))
+            stamps.append(flight.tables[name].t_ns)
     if not stamps:
         return
     source = np.repeat(np.arange(len(stamps)), [len(t) for t in stamps])
@@ -44,7 +47,7 @@ def merge_readings(flight: Flight) -> Iterator[Reading]:
 
 
 def reading_class(spec: AnySensor) -> type[Reading] | None:
-    """Reading class of a sensor; None for what is not fused as it is (camera frames, GPS)."""
+    """Reading class of a sensor; None for camera frames and for what is not fused (GPS)."""
     if isinstance(spec, Uwb):
         by_measurement: dict[str, type[Reading]] = {"range": UwbRange, "tdoa": UwbTdoa, "position": UwbFix}
         return by_measurement[spec.measurement]
@@ -71,6 +74,14 @@ def _maker(kind: type[Reading], sensor: str, table: SensorTable) -> Callable[[in
         return kind(t_ns=t_ns[row], sensor=sensor, **fields)
 
     return make
+
+
+def _frame_maker(flight: Flight, camera: str) -> Callable[[int], Reading]:
+    """Function that gives the next frame; rows of one sensor are asked for in order."""
+    from axialnav.replay.frames import camera_frames
+
+    frames = camera_frames(flight, camera)
+    return lambda _: next(frames)
 
 
 def _plain(value: Any) -> Any:

@@ -122,7 +122,7 @@ def run_motion(
     estimator = MotionEstimator(spec, frames, method, axis=axis, undistort=straight)
     exposures = table.columns.get("exposure_s", np.full(len(table), np.nan))
     estimates = []
-    for k, picture in enumerate(_pictures(flight, camera)):
+    for k, picture in enumerate(pictures(flight, camera)):
         exposure = float(exposures[k])
         estimate = estimator.push(int(table.t_ns[k]), picture, None if math.isnan(exposure) else exposure)
         if estimate is not None:
@@ -136,7 +136,8 @@ def run_motion(
     return MotionRun(flight.name, camera, method, frames, len(table), straight, tuple(estimates), period_s, truth)
 
 
-def _pictures(flight: Flight, camera: str) -> Iterator[NDArray[np.generic]]:
+def pictures(flight: Flight, camera: str) -> Iterator[NDArray[np.generic]]:
+    """Pictures of a camera in the order of its table, from a video or one file each."""
     folder, table = flight.path / "mav0" / camera, flight.tables[camera]
     videos = sorted(folder.glob("video.*"))
     if videos:

@@ -13,6 +13,7 @@ from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.outcome import InnovationLog, Track
 from axialnav.models.rig import Imu
 from axialnav.replay.flight import Flight, load_flight
+from axialnav.replay.frames import with_pixel_motion
 from axialnav.replay.fused import Column, digest, fused_columns
 
 ESTIMATORS = ("corridor",)
@@ -138,7 +139,8 @@ def _filter(
             f"flight {flight.name}: {samples} IMU samples, at least {MIN_IMU_SAMPLES} are needed to replay; "
             f"it holds {there}, the filter needs imu0"
         )
-    result = run_batch(config, flight.tables_for(config), progress)
+    tables = with_pixel_motion(flight, config, flight.tables_for(config))
+    result = run_batch(config, tables, progress)
     return result.track, result.log, result.kernel_s
 
 

@@ -25,6 +25,7 @@ UNKNOWN_ANCHOR, SIGN_UNCERTAIN, TOO_SHORT = (
     int(Reason.SIGN_UNCERTAIN),
     int(Reason.TOO_SHORT),
 )
+NO_MOTION = int(Reason.NO_MOTION)
 SIGN_SIGMAS = 2.0
 
 
@@ -135,6 +136,8 @@ def _pixel_motion(s: Record, window_s: float, axis: Integer, x: Array, m: Record
 def _measure_flow(s: Record, values: Array, x: Array, m: Record, w: Record) -> int:
     if values[4] < s.low:
         return -WEAK_SIGNAL
+    if not np.isfinite(values[1]):
+        return -NO_MOTION
     axes = 2 if np.isfinite(values[2]) else 1
     for i in range(axes):
         w.z[i] = values[1 + i]

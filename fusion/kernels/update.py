@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from axialnav.fusion.kernels.covariance import correct, project
 from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_RANGE, measure
 from axialnav.fusion.memory import LOG_CODE, LOG_GATE, LOG_INNOVATION, LOG_NIS, LOG_VARIANCE, LOG_WEIGHT, LOG_WIDTH
+from axialnav.fusion.outcome import Reason
 from axialnav.models.jit import Record, kernel
 from axialnav.models.rotations import matrix_from_quaternion
 from axialnav.models.state import E_VEL, N_ERROR, POS, QUAT, VEL
 
 Array = NDArray[np.float64]
 MIN_WEIGHT = 1e-3
+NOT_FINITE = int(Reason.NOT_FINITE)
 
 
 @kernel
@@ -60,6 +62,9 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
         return 0.0
     repeated = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
     nis, log_det = _innovate(axes, repeated, P, w)
+    if not np.isfinite(nis):
+        w.row[LOG_CODE] = -NOT_FINITE
+        return 0.0
     gate = s.gate[axes - 1]
     weight = redescend(nis / axes, s.soft_nis) if nis <= gate else 0.0
     w.row[LOG_NIS], w.row[LOG_GATE], w.row[LOG_WEIGHT] = nis, gate, weight

@@ -1,0 +1,54 @@
+"""Recorded camera frames as readings: pixel motion tables for the kernel, frames one by one for the streaming door."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.readings import CameraFrame
+from axialnav.models.rig import Camera
+from axialnav.replay.flight import Flight, SensorTable
+
+
+def with_pixel_motion(flight: Flight, config: Config, tables: Mapping[str, SensorTable]) -> dict[str, SensorTable]:
+    """Copy of ``tables`` in which cameras that look at a surface carry pixel motion instead of file names."""
+    out = dict(tables)
+    for name, spec in config.sensor.items():
+        if isinstance(spec, Camera) and spec.surface is not None and name in out and name not in config.disabled:
+            out[name] = motion_table(flight, name, config)
+    return out
+
+
+def motion_table(flight: Flight, camera: str, config: Config) -> SensorTable:
+    """Pixel motion of every window of frames, stamped at its middle; NaN where the images gave nothing to believe.
+
+    The same estimates as :class:`~axialnav.fusion.camera_feed.CameraFeed` makes of the frames in flight.
+    """
+    from axialnav.replay.motion import run_motion
+
+    frames = config.camera.frames
+    run = run_motion(flight, camera=camera, method=config.camera.method, frames=frames, undistort=True)
+    estimates = [e for e in run.estimates if e.t_ns is not None]
+    window = np.array([e.window_s / (frames - 1) for e in estimates])
+    return SensorTable(
+        t_ns=np.array([e.t_ns for e in estimates], dtype=np.int64),
+        columns={
+            "window_s": window,
+            "dx_px": np.array([e.displacement_px if e.accepted else np.nan for e in estimates]),
+            "sigma_px": np.array([e.sigma_px for e in estimates]),
+        },
+    )
+
+
+def camera_frames(flight: Flight, camera: str) -> Iterator[CameraFrame]:
+    """Frames of a camera as readings, in the order of the file; each picture is read when it is asked for."""
+    from axialnav.replay.motion import pictures
+
+    table = flight.tables[camera]
+    exposures = table.columns.get("exposure_s", np.full(len(table), np.nan))
+    for t_ns, exposure, picture in zip(table.t_ns.tolist(), exposures.tolist(), pictures(flight, camera), strict=False):
+        yield CameraFrame(
+            t_ns=t_ns, sensor=camera, image=picture, exposure_s=exposure if np.isfinite(exposure) else None
+        )
