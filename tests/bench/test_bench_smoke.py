@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from axialnav.replay.flight import load_flight
 from axialnav.replay.sample_flights import sample_flight_path
+from tests.bench import bench_fusion
 from tests.bench.bench_flights import tables
 from tests.bench.flights import DEFAULT, PLAIN, Case
 from tests.bench.slider import slider_table
@@ -33,3 +35,13 @@ def test_the_flight_tables_show_a_limit_that_is_kept_and_one_that_is_not() -> No
 def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
     assert tables((Case("nowhere"),), tmp_path) == f"skipped: nowhere is not in {tmp_path}"
     assert slider_table(tmp_path) == f"skipped: davis_slider_far is not in {tmp_path}"
+
+
+def test_the_speed_tables_have_a_positive_time_in_every_row() -> None:
+    whole, growth, single = bench_fusion.tables([load_flight(SAMPLE)], SAMPLE, count=200, pushed=300)
+    (flight,) = cells(whole, SAMPLE.name)
+    assert int(flight[2]) > int(flight[1]) > 4000  # more scalar updates than readings
+    assert [row[0] for row in cells(growth, "")[4:]] == ["1x", "2x", "4x"]
+    steps = [*cells(single, "kernel"), *cells(single, "filterpy"), *cells(single, "CorridorEstimator.push")]
+    assert len(steps) == 7
+    assert all(float(value) > 0.0 for row in [flight, *steps] for value in row[-3:] if not value.startswith("<="))
