@@ -46,7 +46,7 @@ def replay(
     estimator
         Which filter: corridor.
     smooth
-        Smooth backwards after filtering; refused by estimators that cannot.
+        Go back over the flight after filtering, so that every estimate knows the readings that came later.
     param
         One setting as NAME=VALUE, e.g. uwb.sigma_m=0.4; may be repeated.
     """

@@ -84,7 +84,7 @@ def replay(
     params
         Single settings by dotted name, values as TOML text: ``{"uwb.sigma_m": "0.4"}``.
     smooth
-        Not offered by any estimator of this version; True is refused.
+        Go back over the flight afterwards, so that every estimate knows the readings that came later.
     progress
         Called with the share done, 0 .. 1.
 
@@ -97,14 +97,14 @@ def replay(
     """
     from axialnav.replay.metrics import score
 
-    _refuse_unknown(estimator, smooth)
+    _refuse_unknown(estimator)
     loaded = flight if isinstance(flight, Flight) else load_flight(flight)
     started = time.perf_counter()
     resolved = resolve(config, loaded, without=without, params=params)
-    track, log, kernel_s = _filter(loaded, resolved, progress)
+    track, log, kernel_s = _filter(loaded, resolved, smooth, progress)
     columns = fused_columns(track, resolved.corridor)
     scores = score(track, log, loaded, resolved)
-    head = {"flight": loaded.name, "estimator": estimator, "digest": digest(columns)}
+    head = {"flight": loaded.name, "estimator": estimator, "smoothed": smooth, "digest": digest(columns)}
     timing = _timing(track, kernel_s, time.perf_counter() - started)
     return Run(loaded, resolved, track, log, columns, {**head, **scores, "timing": timing})
 
@@ -119,17 +119,16 @@ def resolve(
     return resolved.without(tuple(without)) if without else resolved
 
 
-def _refuse_unknown(estimator: str, smooth: bool) -> None:
+def _refuse_unknown(estimator: str) -> None:
     if estimator not in ESTIMATORS:
         raise ConfigError(f"no estimator named {estimator!r}; there is {', '.join(ESTIMATORS)}")
-    if smooth:
-        raise ConfigError("smoothing is not available; replay without it (the corridor estimator filters forward)")
 
 
 def _filter(
-    flight: Flight, config: Config, progress: Callable[[float], None] | None
+    flight: Flight, config: Config, smooth: bool, progress: Callable[[float], None] | None
 ) -> tuple[Track, InnovationLog, float]:
     from axialnav.fusion.batch import run_batch
+    from axialnav.fusion.smoother import run_smoothed
 
     inertial = [name for name, spec in config.sensor.items() if isinstance(spec, Imu)]
     samples = max((len(flight.tables.get(name, ())) for name in inertial), default=0)
@@ -140,7 +139,7 @@ def _filter(
             f"it holds {there}, the filter needs imu0"
         )
     tables = with_pixel_motion(flight, config, flight.tables_for(config))
-    result = run_batch(config, tables, progress)
+    result = (run_smoothed if smooth else run_batch)(config, tables, progress)
     return result.track, result.log, result.kernel_s
 
 

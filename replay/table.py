@@ -56,7 +56,7 @@ def _speed(metrics: dict[str, Any]) -> str:
     timing = metrics["timing"]
     return (
         f"replay     {timing['flight_s']:.1f} s in {timing['wall_s']:.2f} s ({timing['real_time_factor']:.0f}x)"
-        f"   kernel {timing['kernel_us_per_imu']:.2f} us per IMU sample"
+        f"   kernel {timing['kernel_us_per_imu']:.2f} us per IMU sample{'   smoothed' * metrics.get('smoothed', False)}"
     )
 
 

@@ -159,6 +159,9 @@ def carry(P: Array, J: Array, out: Array) -> None:
         a, b, c = out[i, 6], out[i, 7], out[i, 8]
         for k in range(3):
             out[i, 6 + k] = a * J[k, 0] + b * J[k, 1] + c * J[k, 2]
+    for i in range(3):
+        for j in range(i):
+            out[6 + i, 6 + j] = out[6 + j, 6 + i]
 
 
 @kernel
