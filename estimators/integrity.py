@@ -82,8 +82,8 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
 def quarrelling(fit: Fit, products: Products) -> Mask:
     """Strips whose own displacement lies far from the common one, shape (s,).
 
-    ``products`` is not needed; far is measured by their own information and by how much strips differ in general, so that a picture that is uneven
-    everywhere loses none.
+    Far is measured by their own information and by how much strips differ in general, so that a picture that is
+    uneven everywhere loses none.
     """
     basis = motion_basis(fit.score.shape[1], len(fit.motion) == 2)[:, 0]
     own = np.einsum("i,sij,j->s", basis, fit.information, basis)

@@ -30,6 +30,7 @@ from axialnav.estimators.integrity import (
     whiteness,
 )
 from axialnav.estimators.joint import Fit, best_bend, fit_motion
+from axialnav.estimators.kappa import blur_ratio
 from axialnav.estimators.layout import STRIPS
 from axialnav.estimators.products import Products
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
@@ -64,6 +65,8 @@ class JointOptions:
         Ask the row bands one by one.
     evenness
         Refuse windows in which a frame was dropped or repeated.
+    kappa
+        Refuse if the blur of the exposure contradicts the displacement.
     """
 
     frame_period_s: float
@@ -71,6 +74,7 @@ class JointOptions:
     prior_px: tuple[float, float] | None = None
     consensus: bool = True
     evenness: bool = True
+    kappa: bool = True
 
     @property
     def exposure_ratio(self) -> float:
@@ -138,6 +142,9 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     reason = doubt_fit(fit, left, products, options)
     if fit is None or left is None or reason:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
+    kappa = blur_ratio(fit, products.band, products.rows.sum(axis=0), options.exposure_ratio)
+    if options.kappa and kappa.alarming:
+        return refused(MotionReason.KAPPA, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
     return MotionEstimate(
         float(fit.motion[0]),
         math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames)),
@@ -146,6 +153,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         MotionReason.GOOD,
         True,
         span_s,
+        kappa.value,
         acceleration_px=float(fit.motion[1]) if len(fit.motion) == 2 else 0.0,
         bands=votes,
     )

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from importlib import import_module
 from itertools import pairwise
 
+import numpy as np
+
+from axialnav.estimators.composite import measure_composite, measure_single
 from axialnav.estimators.errors import FrameError
 from axialnav.estimators.frames import Image, unusable
 from axialnav.estimators.measure import JointOptions, measure_joint
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.window import FrameWindow
 
-LEAST_FRAMES = {"joint": 2}
+BASELINES = ("stripes", "darkline", "dct", "cepstrum")
+LEAST_FRAMES = {"joint": 2, "composite": 2, "single": 1, **dict.fromkeys(BASELINES, 1)}
+BASELINE_SIGMA = 0.2  # the published methods give none; this is what they claim at best
 
 
 def known_method(method: str) -> None:
@@ -37,6 +45,12 @@ def estimate_stack(
     reason = next((why for why in map(unusable, stack) if why), "") or _duplicated(stack)
     if reason:
         return refused(reason, signed=method == "joint", window_s=span_s, method=method)
+    if method == "composite":
+        return measure_composite(stack, frame_period_s, exposure_s)
+    if method == "single":
+        return measure_single(stack[len(stack) // 2], frame_period_s, exposure_s)
+    if method in BASELINES:
+        return _baseline(stack, method, frame_period_s, exposure_s)
     window = FrameWindow(stack[0].shape[0], stack[0].shape[1], len(stack), stack[0].dtype)
     for image in stack:
         window.push(image)
@@ -44,5 +58,22 @@ def estimate_stack(
 
 
 def _duplicated(stack: list[Image]) -> str:
-    same = any((a == b).all() for a, b in pairwise(stack))
-    return MotionReason.DUPLICATED if same else ""
+    return MotionReason.DUPLICATED if any(np.array_equal(a, b) for a, b in pairwise(stack)) else ""
+
+
+def _baseline(stack: list[Image], method: str, frame_period_s: float, exposure_s: float | None) -> MotionEstimate:
+    """A published method on the composite (its length is ``N d``), or on the frame if there is one."""
+    read: Callable[[object], object] = getattr(
+        import_module(f"axialnav.estimators.baselines.{method}"), f"{method}_length"
+    )
+    frames = len(stack)
+    window_s = (frames - 1) * frame_period_s if frames > 1 else exposure_s or 0.0
+    if frames == 1 and not exposure_s:
+        return refused(MotionReason.NO_EXPOSURE, signed=False, window_s=0.0, method=method)
+    reading = read(np.mean(stack, axis=0, dtype=np.float32) if frames > 1 else stack[0])
+    length, found, why = (getattr(reading, name) for name in ("length_px", "found", "reason"))
+    if not found:
+        return refused(why or MotionReason.MODEL, signed=False, window_s=window_s, method=method)
+    per_period = length / frames if frames > 1 else length * frame_period_s / (exposure_s or math.nan)
+    sigma = BASELINE_SIGMA * per_period
+    return MotionEstimate(per_period, sigma, math.nan, True, MotionReason.GOOD, False, window_s, method=method)

@@ -23,6 +23,7 @@ class MotionReason(StrEnum):
     PAIR = "one frame does not fit between its neighbours: dropped, repeated or of something else"
     KAPPA = "exposure blur and displacement contradict each other: wrong period, wrong exposure or a dropped frame"
     SIGMA = "the uncertainty is too large for the displacement to be of use"
+    NO_EXPOSURE = "the exposure is not known, and without it the blur of one frame says nothing about speed"
     SHORT = "the blur is too short to be read"
     MODEL = "the spectrum of the picture does not look like a blurred texture"
 

@@ -45,7 +45,7 @@ def _median_level(sums: Plane, rows: int) -> Plane:
 
 @kernel
 def bin_rows(frame: NDArray[np.uint8], first_row: int, height: int, out: Plane) -> None:
-    """Sum ``height`` rows into each row of ``out`` (r, w), starting at ``first_row``; then take off the columns' levels.
+    """Sum ``height`` rows into each row of ``out`` (r, w), starting at ``first_row``; take off the columns' levels.
 
     Rows outside the frame repeat its first or last row.
     """

@@ -1,0 +1,94 @@
+"""Blur over displacement: an integrity channel that needs no second opinion from outside.
+
+The blur of one exposure is ``l = d t_e / T``; measured in the common picture of the aligned frames and divided by what
+the displacement says, it is 1 for a healthy camera, 1/2 when a frame was dropped, and off by the same factor as a wrong
+exposure or frame period.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.blurfit import blur_shapes
+from axialnav.estimators.joint import Fit
+from axialnav.estimators.spectrum import Band
+from axialnav.estimators.whittle import parabola, transfer, whittle_costs
+
+Array = NDArray[np.float64]
+MIN_LENGTH_PX = 2.0
+RATIOS = np.linspace(0.3, 2.5, 56)
+GROUPS_PER_RIPPLE = 12.0
+SURE = 4.0
+TOLERANCE = 0.25
+MISMATCH = 0.05  # relative error of power laws and Gaussian lenses as spectra of real ones
+UNSURE = 12.0  # log-likelihood by which another ratio must win
+LOWEST_SHARE = 0.2  # of 1 / l: below, stains and lamps spoil the power law
+MIN_GROUPS = 12
+TINY = 1e-9
+
+
+@dataclass(frozen=True)
+class Kappa:
+    """Ratio and its standard deviation [-]; both NaN where the blur is too short or too faint."""
+
+    value: float
+    sigma: float
+
+    @property
+    def alarming(self) -> bool:
+        """Whether blur and displacement contradict each other."""
+        return abs(self.value - 1.0) > SURE * self.sigma + TOLERANCE
+
+
+UNKNOWN = Kappa(math.nan, math.nan)
+
+
+def blur_ratio(fit: Fit, band: Band, rows: Array, exposure_ratio: float) -> Kappa:
+    """Blur length in the common picture over the one expected.
+
+    Parameters
+    ----------
+    fit
+        Joint fit.
+    band
+        Its frequencies.
+    rows
+        Rows behind its spectra, per class, shape (c,).
+    exposure_ratio
+        Exposure over frame period.
+    """
+    expected_px = abs(float(fit.motion[0])) * exposure_ratio
+    if expected_px < MIN_LENGTH_PX:
+        return UNKNOWN
+    frames = fit.score.shape[1]
+    power = np.average(fit.coherent + fit.noise / frames, axis=0, weights=rows)
+    size = max(1, int(band.length / (GROUPS_PER_RIPPLE * 2.0 * expected_px)))
+    first = int(np.searchsorted(band.frequency(), LOWEST_SHARE / expected_px))
+    count = (band.count - first) // size
+    if count < MIN_GROUPS:
+        return UNKNOWN
+
+    def grouped(values: Array) -> Array:
+        used = values[..., first : first + count * size]
+        return np.ascontiguousarray(used.reshape(*values.shape[:-1], count, size).mean(axis=-1))
+
+    tables = grouped(transfer(RATIOS * expected_px, band.frequency(), 1, 1.0))
+    cost = np.empty(len(RATIOS))
+    number = np.empty(len(RATIOS), dtype=np.int64)
+    whittle_costs(np.maximum(grouped(power), TINY), tables, grouped(blur_shapes(band)), cost, number)
+    looks = 1.0 / (1.0 / (float(rows.sum()) * size) + MISMATCH**2)
+    return _read(cost * looks)
+
+
+def _read(cost: Array) -> Kappa:
+    """The ratio near 1 if it is nearly as good as any other, else the best one."""
+    healthy = np.abs(RATIOS - 1.0) <= TOLERANCE
+    best = int(np.argmin(cost))
+    near = int(np.flatnonzero(healthy)[np.argmin(cost[healthy])])
+    k = int(np.clip(near if cost[near] - cost[best] < UNSURE else best, 1, len(RATIOS) - 2))
+    value, bend = parabola(RATIOS[k - 1 : k + 2], cost[k - 1 : k + 2])
+    return Kappa(value, math.sqrt(1.0 / bend)) if bend > 0.0 else UNKNOWN
