@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.models.camera import CompositeBlur, composite_law
-from axialnav.replay.experiments.figures import COLOURS, INK, draw
+from axialnav.replay.experiments.figures import COLOURS, INK, RULE, draw
 from axialnav.replay.experiments.line import Line, fit_line
-from axialnav.replay.experiments.methods import METHODS, Window, known
+from axialnav.replay.experiments.methods import METHODS, Window
 from axialnav.replay.experiments.result import ExperimentResult
 from axialnav.replay.experiments.tables import Table
 from axialnav.replay.simulate.render import (
@@ -33,7 +33,7 @@ FRAMES, CONTRAST, TRIALS = 5, 0.1, 60
 SLOWEST_M_S, FASTEST_M_S = 0.1, 2.5
 PIXEL_M, LENS_M, DISTANCE_M = 3.24e-6, 1.95e-3, 2.026
 CAMERA = CameraModel(width=1920, height=1080, focal_px=LENS_M / PIXEL_M)
-FITTED = known(("stripes, composite", "stripes, composite, oracle", "DCT, composite", "composite fit", "joint"))
+FITTED = ("stripes, composite", "stripes, composite, oracle", "DCT, composite", "composite fit", "joint")
 PAPER = ("the paper, against UWB", 0.0199, 0.0047, 0.0535)
 Array = NDArray[np.float64]
 
@@ -104,10 +104,11 @@ def figure(path: Path, velocity: Array, lengths: dict[str, Array], line: Line | 
             above.plot(lengths[name], velocity, "o", ms=3, color=colour, alpha=0.7, label=name)
             below.plot(lengths[name], velocity - law_m_s_px() * lengths[name], "o", ms=3, color=colour, alpha=0.7)
         above.set(xlim=(0.0, longest), ylim=(0.0, 1.05 * FASTEST_M_S), title="velocity [m/s]")
-        title = "velocity less law [m/s]; the paper's residual rms is 0.0535"
+        below.axhspan(-PAPER[3], PAPER[3], color=RULE, alpha=0.6, lw=0)
+        title = "velocity less law [m/s]; grey: the paper's residual rms, 0.0535"
         if line is not None:
             title += f", ours {line.residual_rms_m_s:.1g} (joint)"
-        below.set(ylim=(-0.2, 0.2), title=title, xlabel="composite length $l_c = N d$ [px]")
+        below.set(ylim=(-0.08, 0.08), title=title, xlabel="composite length $l_c = N d$ [px]")
         above.legend()
 
     return draw(path, (7.0, 5.6), paint)

@@ -10,7 +10,7 @@ import numpy as np
 
 from axialnav.estimators.baselines.composite_mean import composite_mean
 from axialnav.replay.experiments.figures import COLOURS, draw, log_spectrum, picture
-from axialnav.replay.experiments.methods import METHODS, Window, known
+from axialnav.replay.experiments.methods import METHODS, Window
 from axialnav.replay.experiments.result import ExperimentResult
 from axialnav.replay.experiments.scores import Score, score
 from axialnav.replay.experiments.tables import Table
@@ -24,16 +24,14 @@ COUNTS = (2, 3, 5, 10, 20)
 CONTRAST, TRIALS = 0.05, 20
 SLOWEST_PX, FASTEST_PX = 1.0, 20.0
 SHOWN_PX = 8.0  # displacement of the spectra in the figure
-COMPARED = known(
-    (
-        "stripes, composite",
-        "stripes, composite, oracle",
-        "dark line, composite",
-        "DCT, composite",
-        "cepstrum, composite",
-        "composite fit",
-        "joint",
-    )
+COMPARED = (
+    "stripes, composite",
+    "stripes, composite, oracle",
+    "dark line, composite",
+    "DCT, composite",
+    "cepstrum, composite",
+    "composite fit",
+    "joint",
 )
 Scores = dict[str, list[Score]]
 
@@ -89,7 +87,7 @@ def figure(path: Path, seed: int, scores: Scores) -> Path:
             axes = sheet.add_subplot(grid[0, 2 * i : 2 * i + 2])
             picture(axes, log_spectrum(composite, (90, 140)), f"spectrum, N = {count}")
         left, right = sheet.add_subplot(grid[1, : len(COUNTS)]), sheet.add_subplot(grid[1, len(COUNTS) :])
-        for colour, name in zip(COLOURS, COMPARED, strict=False):
+        for colour, name in zip(COLOURS, COMPARED, strict=True):
             row = scores[name]
             left.plot(COUNTS, [100 * s.failed for s in row], "o-", ms=3, lw=1.2, color=colour, label=name)
             right.plot(COUNTS, [s.rms_px for s in row], "o-", ms=3, lw=1.2, color=colour)

@@ -16,7 +16,6 @@ from axialnav.estimators.baselines.dct import dct_length
 from axialnav.estimators.baselines.reading import BlurReading
 from axialnav.estimators.baselines.stripes import stripes_length
 from axialnav.estimators.estimate import estimate_motion
-from axialnav.estimators.methods import LEAST_FRAMES
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,6 @@ def estimator(method: str) -> Measure:
     return measure
 
 
-OWN = {"single": "single fit, one frame", "composite": "composite fit", "joint": "joint"}
 METHODS: dict[str, Measure] = {
     "stripes, one frame": one_frame(stripes_length),
     "stripes, composite": of_composite(stripes_length),
@@ -85,11 +83,7 @@ METHODS: dict[str, Measure] = {
     "DCT, composite": of_composite(dct_length),
     "cepstrum, one frame": one_frame(cepstrum_length),
     "cepstrum, composite": of_composite(cepstrum_length),
-    **{name: estimator(method) for method, name in OWN.items() if method in LEAST_FRAMES},
+    "single fit, one frame": estimator("single"),
+    "composite fit": estimator("composite"),
+    "joint": estimator("joint"),
 }
-"""Every method under the name it has in tables: the published ones, then all the estimators there are."""
-
-
-def known(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of ``names`` that are methods, in their order."""
-    return tuple(name for name in names if name in METHODS)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from axialnav.estimators.baselines.composite_mean import composite_mean
 from axialnav.estimators.baselines.stripes import binarised_spectrum, stripes_length
 from axialnav.replay.experiments.figures import COLOURS, draw, log_spectrum, picture, shrunk
-from axialnav.replay.experiments.methods import METHODS, Window, known
+from axialnav.replay.experiments.methods import METHODS, Window
 from axialnav.replay.experiments.result import ExperimentResult
 from axialnav.replay.experiments.scores import Score, score
 from axialnav.replay.experiments.tables import Table
@@ -27,16 +27,14 @@ NAME = "single-vs-composite"
 DISPLACEMENTS_PX = (0.7, 1.5, 3.3, 6.7, 12.3, 20.7, 31.0, 45.0)
 FRAMES, CONTRAST, TRIALS = 5, 0.1, 12
 HAND_BLUR_PX = 63
-PLOTTED = known(
-    (
-        "stripes, one frame",
-        "stripes, composite",
-        "DCT, one frame",
-        "DCT, composite",
-        "single fit, one frame",
-        "composite fit",
-        "joint",
-    )
+PLOTTED = (
+    "stripes, one frame",
+    "stripes, composite",
+    "DCT, one frame",
+    "DCT, composite",
+    "single fit, one frame",
+    "composite fit",
+    "joint",
 )
 Scores = dict[str, list[Score]]
 
@@ -121,7 +119,7 @@ def figure(path: Path, seed: int, scores: Scores) -> Path:
 
 def _curves(sheet: Figure, grid: object, scores: Scores) -> None:
     failed, error = sheet.add_subplot(grid[3, :2]), sheet.add_subplot(grid[3, 2:])  # type: ignore[index]
-    for colour, name in zip(COLOURS, PLOTTED, strict=False):
+    for colour, name in zip(COLOURS, PLOTTED, strict=True):
         row = scores[name]
         failed.plot(DISPLACEMENTS_PX, [100 * s.failed for s in row], "o-", ms=3, lw=1.2, color=colour, label=name)
         error.plot(DISPLACEMENTS_PX, [s.median_px for s in row], "o-", ms=3, lw=1.2, color=colour)
