@@ -23,7 +23,7 @@ FINE_FROM, MIDDLE = 0.75, (0.2, 0.45)
 FAR = 4.0
 MEDIAN_OF_NORMAL = 0.6745
 MAX_LOST_STRIPS = 5
-MAX_ALIEN = 1.4
+MAX_ALIEN, MAX_ALIEN_SHARE = 1.4, 0.15
 TINY = 1e-12
 
 
@@ -102,10 +102,12 @@ def disturbed(fit: Fit, products: Products) -> Mask:
     frames = products.frames
     whole = np.einsum("scf,cf->s", products.power, fit.weight)
     moving = whole + 2.0 * fit.coherence.sum(axis=1)
-    alien = (whole - moving / frames) / (frames - 1) / products.rows.sum(axis=1)
+    rows = products.rows.sum(axis=1)
+    alien = (whole - moving / frames) / (frames - 1) / rows
+    texture = (moving - whole) / (frames * (frames - 1)) / rows
     order = np.argsort(alien)
     usual = float(np.median(alien[order[: (len(alien) + 1) // 2 + 1]]))
-    bad = alien > MAX_ALIEN * usual
+    bad = (alien > MAX_ALIEN * usual) & (alien - usual > MAX_ALIEN_SHARE * texture)
     bad[order[: len(alien) - MAX_LOST_STRIPS]] = False
     return np.asarray(bad)
 
