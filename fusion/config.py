@@ -99,7 +99,7 @@ class ImuFault(_Table, frozen=True, kw_only=True):
     ``doubt_time_s``, a rival filter with ``noise_scale`` times the accelerometer noise and the bias walk ``bias_walk``
     [m s^-3 Hz^-1/2] runs beside for ``trial_s`` on the same readings.  It takes over when the readings are
     exp(``evidence``) times as likely under it; it hands back after ``trials_to_clear`` trials in a row in which the
-    healthy filter explains them no worse.
+    healthy filter explains them nearly as well (less than exp(``evidence_to_clear``) times worse).
     """
 
     enabled: bool = True
@@ -109,6 +109,7 @@ class ImuFault(_Table, frozen=True, kw_only=True):
     doubt_time_s: Positive = 0.5
     trial_s: Positive = 2.0
     evidence: Positive = 40.0
+    evidence_to_clear: NonNegative = 1.5
     trials_to_clear: Annotated[int, msgspec.Meta(ge=1)] = 5
 
 

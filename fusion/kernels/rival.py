@@ -57,7 +57,7 @@ def _judge(fault: bool, over: bool, m: Record, c: Record) -> None:
             m.good_trials = 0
         elif over:
             m.on_trial = 0
-            m.good_trials = m.good_trials + 1 if evidence >= 0.0 else 0
+            m.good_trials = m.good_trials + 1 if evidence >= -c.evidence_to_clear else 0
             if m.good_trials >= c.trials_to_clear:
                 _take_over(m)
     elif evidence > c.evidence:
