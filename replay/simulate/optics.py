@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.errors import ConfigError
 
 Array = NDArray[np.float64]
-BISECTIONS = 40  # 1e-11 focal lengths
+TABLE_SIZE = 100_001  # of radii: exact to some 1e-8 focal lengths
 MAX_RADIUS = 20.0  # [focal lengths]: 87 degrees off the axis
 MAX_SHARE_OF_FOLD = 0.98
 
@@ -78,7 +78,7 @@ def fixed_pattern(
 def undistorted(u_px: Array, v_px: Array, focal_px: float, k1: float, k2: float) -> tuple[Array, Array]:
     """Pinhole coordinates of distorted pixels, both relative to the principal point [px].
 
-    Solves ``r_d = r (1 + k1 r^2 + k2 r^4)`` (Brown's radial terms, radius in focal lengths) by bisection.
+    Solves ``r_d = r (1 + k1 r^2 + k2 r^4)`` (Brown's radial terms, radius in focal lengths) by a table of radii.
 
     Raises
     ------
@@ -94,12 +94,9 @@ def undistorted(u_px: Array, v_px: Array, focal_px: float, k1: float, k2: float)
             f"the radial distortion k1 = {k1}, k2 = {k2} folds the picture over within its corners at "
             f"{distorted.max():.2f} focal lengths; use smaller coefficients or a longer focal length"
         )
-    low, high = np.zeros_like(distorted), np.full_like(distorted, min(edge, MAX_RADIUS))
-    for _ in range(BISECTIONS):
-        radius = 0.5 * (low + high)
-        beyond = radius * (1.0 + k1 * radius**2 + k2 * radius**4) > distorted
-        low, high = np.where(beyond, low, radius), np.where(beyond, radius, high)
-    scale = low / np.maximum(distorted, 1e-12)
+    radius = np.linspace(0.0, min(edge, MAX_RADIUS), TABLE_SIZE)
+    solved = np.interp(distorted, radius * (1.0 + k1 * radius**2 + k2 * radius**4), radius)
+    scale = solved / np.maximum(distorted, 1e-12)
     return u_px * scale, v_px * scale
 
 
