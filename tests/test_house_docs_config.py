@@ -64,7 +64,7 @@ def expected(struct: type[msgspec.Struct], skip: set[str] = frozenset()) -> dict
 
 COMMON = set(rig.Sensor.__struct_fields__)
 TABLES = {
-    "flight": expected(tables.Config, HOLDERS | set(SETTINGS)),
+    "top of the file": expected(tables.Config, HOLDERS | set(SETTINGS)),
     "[corridor]": expected(tables.Corridor, {"section"}),
     "[[corridor.section]]": expected(tables.Section),
     "[initial]": expected(tables.Initial),
