@@ -14,7 +14,7 @@ NOT_EVALUATED = 3
 
 
 def motion_command(
-    flight: Path,
+    flight: Path | None = None,
     /,
     *,
     method: str = "joint",
@@ -24,6 +24,9 @@ def motion_command(
     distance_m: float | None = None,
     undistort: Annotated[bool | None, Parameter(negative="--raw")] = None,
     out: Path | None = None,
+    experiment: str | None = None,
+    seed: int = 1,
+    trials: int | None = None,
 ) -> int:
     """Measure image motion in the frames of a flight and score it against the truth.
 
@@ -32,7 +35,7 @@ def motion_command(
     Parameters
     ----------
     flight
-        Flight folder with camera frames.
+        Flight folder with camera frames; not needed for an experiment.
     method
         joint (default), composite, single, or a published baseline: stripes, darkline, dct, cepstrum.
     frames
@@ -48,8 +51,18 @@ def motion_command(
         Remove the lens' distortion first; by default only if the camera names a surface. --raw: use the pixels as
         recorded.
     out
-        CSV file to write, one line per window.
+        CSV file to write, one line per window; for an experiment the folder of its table and figure.
+    experiment
+        Run one of the paper's experiments on rendered walls instead: single-vs-composite, frames, calibration.
+    seed
+        Of the experiment's random numbers.
+    trials
+        Windows per condition of the experiment; its own number if not given.
     """
+    if experiment is not None:
+        return _experiment(experiment, out or Path("runs") / experiment, seed, trials)
+    if flight is None:
+        raise ConfigError("motion needs a flight folder, or --experiment NAME")
     from axialnav.estimators.estimate import FrameError
     from axialnav.replay.flight import load_flight
     from axialnav.replay.motion import run_motion
@@ -68,6 +81,14 @@ def motion_command(
         out.write_text(run.to_csv(), encoding="utf-8")
     emit(motion_summary(run))
     return 0 if run.accepted().any() else NOT_EVALUATED
+
+
+def _experiment(name: str, out: Path, seed: int, trials: int | None) -> int:
+    from axialnav.replay.experiments.command import experiment_command
+
+    result = experiment_command(name, out, seed, trials)
+    emit("\n".join([result.text.rstrip("\n"), *(f"written    {file}" for file in result.files)]))
+    return 0
 
 
 def _sorted_error(error: ValueError) -> ConfigError | FlightError:

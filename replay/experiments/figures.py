@@ -8,7 +8,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -66,17 +65,27 @@ def picture(axes: Axes, image: NDArray[Any], title: str) -> None:
     axes.set_axis_off()
 
 
+def _area_mean(image: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Picture reduced to ``shape`` by averaging nearly equal blocks."""
+    small = image.astype(np.float64)
+    for axis, cells in enumerate(shape):
+        edges = np.linspace(0, image.shape[axis], cells + 1).astype(int)
+        sizes = np.diff(edges).reshape([-1 if a == axis else 1 for a in range(2)])
+        small = np.add.reduceat(small, edges[:-1], axis=axis) / sizes
+    return small
+
+
 def log_spectrum(image: NDArray[Any], shape: tuple[int, int] = (90, 180)) -> NDArray[np.uint8]:
     """Centred log spectrum of a picture, shrunk to ``shape`` and stretched to 0-255 for show."""
     grey = np.asarray(image, dtype=np.float32)
     spectrum = np.fft.fftshift(np.log1p(np.abs(np.fft.fft2(grey - grey.mean())))).astype(np.float32)
-    small = cv2.resize(spectrum, shape[::-1], interpolation=cv2.INTER_AREA)
+    small = _area_mean(spectrum, shape)
     low, high = np.percentile(small, (1.0, 99.5))
     return np.asarray(np.clip((small - low) * (255.0 / (high - low)), 0, 255), dtype=np.uint8)
 
 
 def shrunk(image: NDArray[Any], shape: tuple[int, int] = (90, 180)) -> NDArray[np.uint8]:
     """Picture reduced to ``shape`` for show, its grey values stretched to 0-255."""
-    small = cv2.resize(np.asarray(image, dtype=np.float32), shape[::-1], interpolation=cv2.INTER_AREA)
+    small = _area_mean(np.asarray(image, dtype=np.float32), shape)
     low, high = np.percentile(small, (0.5, 99.5))
     return np.asarray(np.clip((small - low) * (255.0 / max(high - low, 1e-6)), 0, 255), dtype=np.uint8)

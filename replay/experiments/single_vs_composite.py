@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from axialnav.estimators.baselines.composite_mean import composite_mean
 from axialnav.estimators.baselines.stripes import binarised_spectrum, stripes_length
@@ -83,8 +83,8 @@ def pivot(scores: Scores) -> Table:
 
 def hand_blurred() -> NDArray[np.float32]:
     """A photograph without noise under a box of ``HAND_BLUR_PX``, as in the paper's Fig. 5."""
-    box = np.full((1, HAND_BLUR_PX), 1.0 / HAND_BLUR_PX, dtype=np.float32)
-    return np.asarray(cv2.filter2D(load_texture("concrete"), -1, box)[100:640, 100:1060], dtype=np.float32)
+    blurred = uniform_filter1d(load_texture("concrete"), HAND_BLUR_PX, axis=1)
+    return np.asarray(blurred[100:640, 100:1060], dtype=np.float32)
 
 
 def figure(path: Path, seed: int, scores: Scores) -> Path:
