@@ -101,8 +101,11 @@ class Pass:
             self.cuts.append((at, row, memory.copy()))
         return spent
 
-    def backward(self, progress: Callable[[float], None] | None = None) -> float:
-        """Smooth from the last stretch to the first; return the time spent in the kernels [s]."""
+    def backward(self, progress: Callable[[float], None] | None = None, *, smooth: bool = True) -> float:
+        """Smooth from the last stretch to the first; return the time spent in the kernels [s].
+
+        Without ``smooth`` the stretches are only recorded again, so that the two can be timed apart.
+        """
         longest = max((b[0] - a[0] for a, b in pairwise(self.cuts)), default=0)
         # a row more than there can be steps: the record of an event that turns out to be no step
         steps, work, scratch = np.zeros(longest + 1, STEP), np.zeros(1, WORK), new_scratch()
@@ -117,7 +120,8 @@ class Pass:
                 start, stop, *self.events, self.sources, again.core, again.sources, scratch, self.settings,
                 one_row, one_log, imu, steps,
             )  # fmt: skip
-            smooth_back(steps, n, work, self.settings[0], self.rows[row:])
+            if smooth:
+                smooth_back(steps, n, work, self.settings[0], self.rows[row:])
             spent += time.perf_counter() - began
             self.steps += n
             if progress is not None:

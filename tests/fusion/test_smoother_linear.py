@@ -1,0 +1,85 @@
+"""The smoother on linear systems: equal to filterpy's and to one dense solve over the whole trajectory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from axialnav.fusion.kernels.smooth import factorise, smooth_back, solve
+from tests.fusion.linear_flights import UNITS, as_records, dense_answer, filtered, make_linear, states_of
+from tests.fusion.test_covariance_kernels import random_covariance
+
+STEPS = 25
+
+
+def scaled_inverse(A: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.sqrt(np.diag(A))
+    return np.asarray(scale[:, None] * np.linalg.inv(scale[:, None] * A * scale) * scale)
+
+
+def test_equals_the_smoother_of_filterpy() -> None:
+    system = make_linear(1, STEPS)
+    kf, x, P, _, _ = filtered(system)
+    # filterpy takes the transition that leads to an instant under that instant's index
+    led = [np.eye(18), *system.Phi]
+    noise = [np.zeros((18, 18)), *system.Q]
+    expected, P_expected, _, _ = kf.rts_smoother(x[..., None], P, led, noise, inv=scaled_inverse)
+    steps, work, settings, track = as_records(system)
+    smooth_back(steps, STEPS, work, settings[0], track)
+    mean, variance = states_of(track)
+    np.testing.assert_allclose(mean[1:] / UNITS, expected[1:, :, 0] / UNITS, atol=1e-9)
+    np.testing.assert_allclose(
+        variance[1:] / UNITS**2, np.diagonal(P_expected, 0, 1, 2)[1:] / UNITS**2, rtol=1e-8, atol=1e-10
+    )
+    np.testing.assert_allclose(work["P"][0] / np.outer(UNITS, UNITS), P_expected[0] / np.outer(UNITS, UNITS), atol=1e-8)
+
+
+@pytest.mark.parametrize("reanchored_at", [None, 11])
+def test_equals_one_solve_over_the_whole_trajectory(reanchored_at: int | None) -> None:
+    """With a re-anchoring: readings after it say nothing of the position before it, but all the rest passes."""
+    system = make_linear(2, STEPS, reanchored_at)
+    expected, P_expected = dense_answer(system)
+    steps, work, settings, track = as_records(system)
+    smooth_back(steps, STEPS, work, settings[0], track)
+    mean, variance = states_of(track)
+    np.testing.assert_allclose(mean[1:] / UNITS, expected[1:] / UNITS, atol=1e-9)
+    np.testing.assert_allclose(
+        variance[1:] / UNITS**2, np.diagonal(P_expected, 0, 1, 2)[1:] / UNITS**2, rtol=1e-8, atol=1e-10
+    )
+
+
+def test_position_information_does_not_cross_a_reanchoring() -> None:
+    """Only the positions of later readings are changed: nothing before the re-anchoring may move."""
+
+    def smoothed(later: float) -> np.ndarray:
+        system = make_linear(3, STEPS, 11)
+        system.H[12:, :, 3:] = 0.0
+        system.z[12:] += later
+        # no time passes afterwards, so that no velocity can carry the news of a position
+        system.dt[12:], system.Phi[12:, 0:3, 3:6], system.Phi[12:, 6:9, 9:12] = 1e-300, 0.0, 0.0
+        system.Phi[12:, 16, 16] = 1.0
+        steps, work, settings, track = as_records(system)
+        smooth_back(steps, STEPS, work, settings[0], track)
+        return states_of(track)[0]
+
+    here, there = smoothed(0.0), smoothed(50.0)
+    assert np.abs(here[13:, :3] - there[13:, :3]).max() > 1.0
+    np.testing.assert_allclose(here[1:11] / UNITS, there[1:11] / UNITS, atol=1e-12)
+
+
+def test_the_solver_is_the_inverse_of_badly_scaled_covariances() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        P, X = random_covariance(rng), rng.normal(size=(18, 18))
+        Y, U, scale, inverse = X.copy(), np.zeros((18, 18)), np.empty(18), np.empty(18)
+        factorise(P, scale, inverse, U)
+        solve(U, scale, inverse, Y)
+        np.testing.assert_allclose(P @ Y, X, atol=1e-8 * np.abs(X).max())
+
+
+def test_a_quantity_known_exactly_is_left_alone() -> None:
+    P = np.diag(np.r_[1.0, 0.0, np.ones(16)])
+    X, U, scale, inverse = np.eye(18), np.zeros((18, 18)), np.empty(18), np.empty(18)
+    factorise(P, scale, inverse, U)
+    solve(U, scale, inverse, X)
+    np.testing.assert_array_equal(X, P)
