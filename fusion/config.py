@@ -7,6 +7,7 @@ flight folder (:meth:`Config.with_defaults_from`).
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -34,10 +35,14 @@ class Section(_Table, frozen=True, kw_only=True):
 
 
 class Corridor(_Table, frozen=True, kw_only=True):
-    """Where the corridor runs; ``axis`` is the unit vector along which "axial" is meant."""
+    """Where the corridor runs; ``axis`` points the way that is meant by "axial" (any length)."""
 
     axis: Vector3 = (1.0, 0.0, 0.0)
     section: tuple[Section, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 1e-6 < math.hypot(*self.axis) < 1e6:
+            raise ValueError(f"corridor axis must point somewhere, got {self.axis}; the default is (1, 0, 0)")
 
 
 class Initial(_Table, frozen=True, kw_only=True):
@@ -217,7 +222,9 @@ class Config(_Table, frozen=True, kw_only=True):
     @property
     def axis(self) -> Vector3:
         """Unit vector along which "axial" is meant, corridor frame."""
-        return (self.corridor or Corridor()).axis
+        x, y, z = (self.corridor or Corridor()).axis
+        length = math.hypot(x, y, z)
+        return x / length, y / length, z / length
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], *, where: str = "configuration") -> Config:

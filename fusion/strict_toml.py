@@ -19,7 +19,7 @@ from axialnav.fusion.errors import ConfigError
 
 T = TypeVar("T")
 _UNKNOWN = re.compile(r"unknown field `(?P<field>[^`]+)`(?: - at `(?P<path>[^`]+)`)?")
-_BARE_KEY = re.compile(r"^[A-Za-z0-9_-]+$")
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def decode(data: Mapping[str, Any], kind: type[T], *, where: str) -> T:
@@ -28,12 +28,27 @@ def decode(data: Mapping[str, Any], kind: type[T], *, where: str) -> T:
     Raises
     ------
     ConfigError
-        Unknown key (with the nearest known one), wrong type or value out of limits; ``where`` names the source.
+        Unknown key (with the nearest known one), wrong type, not a number, or value out of limits; ``where`` names the
+        source.
     """
+    for path in _not_numbers(data, ""):
+        raise ConfigError(f"{where}: {path} is nan; write a number or leave it out")
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
         raise ConfigError(f"{where}: {_explain(str(error), kind)}") from None
+
+
+def _not_numbers(node: Any, path: str) -> Iterator[str]:
+    """Yield where in plain data a nan is; one in a position would blind the filter without a word."""
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            yield from _not_numbers(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(node, list | tuple):
+        for index, value in enumerate(node):
+            yield from _not_numbers(value, f"{path}[{index}]")
+    elif isinstance(node, float) and math.isnan(node):
+        yield path
 
 
 def parse(text: str, *, where: str) -> dict[str, Any]:
@@ -84,7 +99,9 @@ def set_by_path(data: dict[str, Any], path: str, text: str) -> None:
     if not key or not all(tables):
         raise ConfigError(f"parameter name must be dotted like uwb.sigma_m, got {path!r}")
     for name in tables:
-        data = data.setdefault(name, {})
+        if data.get(name) is None:
+            data[name] = {}
+        data = data[name]
         if not isinstance(data, dict):
             raise ConfigError(f"parameter {path!r} runs through {name!r}, which is a value and not a table")
     try:
@@ -119,14 +136,14 @@ def _lines(data: Mapping[str, Any], prefix: tuple[str, ...]) -> Iterator[str]:
 
 
 def _key(key: str) -> str:
-    return key if _BARE_KEY.match(key) else _value(key)
+    return key if _BARE_KEY.fullmatch(key) else _value(key)
 
 
 def _value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return msgspec.json.encode(value).decode()
+        return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")  # JSON allows it bare, TOML does not
     if isinstance(value, float):
         return repr(value) if math.isfinite(value) else ("nan" if value != value else f"{'-' * (value < 0)}inf")
     if isinstance(value, int):

@@ -6,7 +6,7 @@ belong together as they do on a real one.  Readings are sampled, noisy and quant
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import msgspec
@@ -84,7 +84,7 @@ class Scene:
     uwb_rate_hz: float = 40.0
     accel_bias_sigma: float = 0.3
     gyro_bias_sigma: float = 0.01
-    accel_fault: Mapping[str, float] = field(default_factory=dict)  # start_s, end_s, size_m_s2, wander_m_s2
+    accel_fault: Mapping[str, float] = field(default_factory=dict)  # start_s, end_s, ramp_s, size_m_s2, wander_m_s2
     outlier_share: float = 0.0
     outlier_m: float = 3.0
     shadow_s: tuple[float, float] = (0.0, 0.0)  # reflected UWB: between these instants, too long by shadow_m
@@ -154,14 +154,21 @@ def _walk(rng: np.random.Generator, n: int) -> Array:
     return np.cumsum(steps, axis=0)
 
 
-def _fault(t: Array, rng: np.random.Generator, start_s: float, end_s: float, size_m_s2: float, wander_m_s2: float):
-    """A jump that wanders with a time constant of 2 s."""
-    dt = t[1] - t[0]
-    keep = np.exp(-dt / 2.0)
+def _fault(
+    t: Array,
+    rng: np.random.Generator,
+    start_s: float,
+    end_s: float,
+    ramp_s: float,
+    size_m_s2: float,
+    wander_m_s2: float,
+) -> Array:
+    """An error that grows over ``ramp_s``, then wanders with a time constant of 2 s, until it is gone again."""
+    keep = np.exp(-(t[1] - t[0]) / 2.0)
     wander = np.zeros(len(t))
     for k in range(1, len(t)):
         wander[k] = keep * wander[k - 1] + np.sqrt(1 - keep**2) * wander_m_s2 * rng.normal()
-    return np.where((t >= start_s) & (t < end_s), size_m_s2 + wander, 0.0)
+    return np.clip((t - start_s) / ramp_s, 0.0, 1.0) * (t < end_s) * (size_m_s2 + wander)
 
 
 def stamps(t: Array) -> NDArray[np.int64]:
@@ -246,7 +253,7 @@ def _autopilot(scene: Scene, rng: np.random.Generator) -> Table:
     return Table(stamps(at.t), {"roll_rad": roll, "pitch_rad": pitch, "yaw_rad": np.zeros(len(at.t))})
 
 
-SENSORS = {
+SENSORS: dict[str, Callable[[Scene, np.random.Generator], Table]] = {
     "range": _range, "flow": _flow, "uwb": _uwb, "tdoa": _tdoa, "fix": _fix, "baro": _baro, "attitude": _autopilot,
 }  # fmt: skip
 
