@@ -19,7 +19,8 @@ Plane = NDArray[np.float32]
 LOWEST_PX, HIGHEST_PX = 0.3, 64.0
 MIN_COMPOSITE_PX = 2.5
 MIN_BLUR_PX, MAX_BLUR_PX = 3.0, 96.0
-MIN_GAIN, MIN_LEAD = 12.0, 6.0
+COMPOSITE_GAIN, SINGLE_GAIN, MIN_LEAD = 12.0, 60.0, 6.0
+SINGLE_BINS = 8  # blur that also goes a little across the rows smears the dark lines of single rows
 MAX_RELATIVE_SIGMA = 0.15
 SIGMA_SCALE = 3.0  # measured: no lens is a Gaussian, no texture a power law
 
@@ -38,9 +39,9 @@ def row_power(planes: list[Plane]) -> tuple[Array, Band]:
     return sums / np.diff(edges)[:, None], band
 
 
-def binned(image: Image) -> Plane:
-    """Binned rows (r, w) of a frame, the columns' level taken off."""
-    height = bin_height(*image.shape)
+def binned(image: Image, bins: int = 1) -> Plane:
+    """Rows of a frame (r, w) summed over ``bins`` usual bins, the columns' level taken off."""
+    height = bins * bin_height(*image.shape)
     out = np.empty((image.shape[0] // height, image.shape[1]), dtype=np.float32)
     bin_rows(image, 0, height, out)
     return out
@@ -63,7 +64,7 @@ def measure_composite(stack: list[Image], frame_period_s: float, exposure_s: flo
     span_s = (len(stack) - 1) * frame_period_s
     if fit.value_px * len(stack) < MIN_COMPOSITE_PX:
         return refused(MotionReason.SHORT, signed=False, window_s=span_s, method="composite")
-    return _told(fit, 1.0, "composite", span_s)
+    return _told(fit, 1.0, "composite", span_s, COMPOSITE_GAIN)
 
 
 def measure_single(image: Image, frame_period_s: float, exposure_s: float | None) -> MotionEstimate:
@@ -80,16 +81,17 @@ def measure_single(image: Image, frame_period_s: float, exposure_s: float | None
     """
     if not exposure_s:
         return refused(MotionReason.NO_EXPOSURE, signed=False, window_s=0.0, method="single")
-    power, band = row_power([binned(image)])
+    plane = binned(image, SINGLE_BINS)
+    power, band = row_power([plane])
     model = BlurModel(1, 1.0, MIN_BLUR_PX / 2.0, min(MAX_BLUR_PX, band.length / 6.0))
-    fit = fit_blur(power, band, image.shape[0] // bin_height(*image.shape), model)
+    fit = fit_blur(power, band, plane.shape[0], model)
     if math.isfinite(fit.value_px) and fit.value_px < MIN_BLUR_PX:
         return refused(MotionReason.SHORT, signed=False, window_s=exposure_s, method="single")
-    return _told(fit, frame_period_s / exposure_s, "single", exposure_s)
+    return _told(fit, frame_period_s / exposure_s, "single", exposure_s, SINGLE_GAIN)
 
 
-def _told(fit: BlurFit, scale: float, method: str, window_s: float) -> MotionEstimate:
-    if not (fit.gain > MIN_GAIN and fit.lead > MIN_LEAD and math.isfinite(fit.sigma_px)):
+def _told(fit: BlurFit, scale: float, method: str, window_s: float, least_gain: float) -> MotionEstimate:
+    if not (fit.gain > least_gain and fit.lead > MIN_LEAD and math.isfinite(fit.sigma_px)):
         return refused(MotionReason.MODEL, signed=False, window_s=window_s, method=method)
     if fit.sigma_px * SIGMA_SCALE > max(MAX_RELATIVE_SIGMA * fit.value_px, 0.1):
         return refused(MotionReason.SIGMA, signed=False, window_s=window_s, method=method)
