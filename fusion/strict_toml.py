@@ -32,7 +32,7 @@ def decode(data: Mapping[str, Any], kind: type[T], *, where: str) -> T:
         source.
     """
     for path in _not_numbers(data, ""):
-        raise ConfigError(f"{where}: {path} is nan; write a number or leave it out")
+        raise ConfigError(f"{where}: {path} must be a finite number; correct it or leave it out")
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
@@ -46,7 +46,7 @@ def _not_numbers(node: Any, path: str) -> Iterator[str]:
             yield from _not_numbers(value, f"{path}.{key}" if path else str(key))
     elif isinstance(node, list | tuple):
         for index, value in enumerate(node):
-            yield from _not_numbers(value, f"{path}[{index}]")
+            yield from _not_numbers(value, f"{path}.{index}")
     elif isinstance(node, float) and math.isnan(node):
         yield path
 

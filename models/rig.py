@@ -30,8 +30,9 @@ class Sensor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     def __post_init__(self) -> None:
         matrix = np.array(self.T_BS, dtype=np.float64).reshape(4, 4)
-        if not np.isfinite(matrix).all():
-            raise ValueError(f"T_BS must hold finite numbers only, got {self.T_BS}")
+        strange = np.flatnonzero(~np.isfinite(matrix.ravel()))
+        if strange.size:
+            raise ValueError(f"T_BS.{strange[0]} must be a finite number; correct it or leave it out")
         rotation = matrix[:3, :3]
         error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if not (error < ROTATION_TOLERANCE and np.linalg.det(rotation) > 0.0):
