@@ -1,0 +1,141 @@
+"""The joint estimate on rendered walls: accuracy, honest sigma, and each safeguard switched on and off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from axialnav.estimators.estimate import MotionEstimate, MotionReason, estimate_motion
+from axialnav.estimators.measure import JointOptions, measure_joint
+from axialnav.estimators.window import FrameWindow
+from axialnav.replay.simulate.render import Rendering, dropped_frame
+from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered
+
+
+def measured(picture: Rendering, **options: object) -> MotionEstimate:
+    frames = picture.frames
+    window = FrameWindow(frames.shape[1], frames.shape[2], len(frames), frames.dtype)
+    for frame in frames:
+        window.push(frame)
+    return measure_joint(window, JointOptions(PERIOD_S, EXPOSURE_S, **options))  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_errors_are_small_signed_and_as_large_as_sigma_says() -> None:
+    """40 windows of a weakly textured wall in dim light, 0.5 to 40 px per frame, both ways."""
+    rng = np.random.default_rng(1)
+    errors, z = [], []
+    for seed in range(40):
+        d = float(np.exp(rng.uniform(np.log(0.5), np.log(40.0)))) * (1.0 if seed % 2 else -1.0)
+        picture = rendered(d, seed)
+        estimate = estimate_motion(picture.frames, frame_period_s=PERIOD_S, exposure_s=EXPOSURE_S)
+        assert estimate.accepted, estimate.reason
+        assert estimate.signed
+        errors.append(estimate.displacement_px - picture.displacement_px)
+        z.append(errors[-1] / estimate.sigma_px)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.02
+    assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.4
+
+
+@pytest.mark.parametrize("frames", [2, 3, 5, 8])
+def test_any_number_of_frames_from_two(frames: int) -> None:
+    picture = rendered(6.3, 3, frames=frames, bright=True, contrast=0.1)
+    estimate = estimate_motion(picture.frames, frame_period_s=PERIOD_S)
+    assert estimate.displacement_px == pytest.approx(6.3, abs=0.02)
+    assert estimate.window_s == pytest.approx((frames - 1) * PERIOD_S)
+
+
+def test_motion_down_the_columns_is_the_same_measurement() -> None:
+    frames = np.ascontiguousarray(rendered(4.2, 4).frames.transpose(0, 2, 1))
+    estimate = estimate_motion(frames, frame_period_s=PERIOD_S, axis="y")
+    assert estimate.displacement_px == pytest.approx(4.2, abs=0.03)
+
+
+def test_drift_across_the_rows_is_seen_and_followed() -> None:
+    picture = rendered(9.0, 5, drift_px=2.0)
+    estimate = estimate_motion(picture.frames, frame_period_s=PERIOD_S)
+    assert estimate.cross_px == pytest.approx(2.0, abs=0.15)
+    assert estimate.displacement_px == pytest.approx(9.0, abs=0.04)
+
+
+def test_acceleration_is_fitted_where_it_shows_and_only_there() -> None:
+    bent = estimate_motion(rendered(9.0, 6, acceleration_px=1.0).frames, frame_period_s=PERIOD_S)
+    assert bent.acceleration_px == pytest.approx(1.0, abs=0.05)
+    assert bent.displacement_px == pytest.approx(9.0, abs=0.04)
+    straight = estimate_motion(rendered(9.0, 6).frames, frame_period_s=PERIOD_S)
+    assert straight.acceleration_px == 0.0
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3])
+def test_a_dropped_frame_is_refused_and_believed_without_the_check(place: int) -> None:
+    picture = rendered(3.0, 7, bright=True, contrast=0.1, frame_times=dropped_frame(5, place))
+    guarded = measured(picture)
+    assert not guarded.accepted
+    assert guarded.reason in (MotionReason.UNEVEN, MotionReason.PAIR)
+    assert measured(picture, evenness=False, kappa=False).reason not in (MotionReason.UNEVEN, MotionReason.PAIR)
+
+
+def test_a_dropped_frame_between_two_is_caught_by_the_blur_alone() -> None:
+    """N = 2 leaves nothing to compare but the length of the blur: half of what the displacement says."""
+    picture = rendered(24.0, 8, bright=True, contrast=0.1, frames=2, frame_times=(0.0, 2.0))
+    guarded = measured(picture)
+    assert guarded.reason == MotionReason.KAPPA
+    assert guarded.kappa == pytest.approx(0.5, abs=0.1)
+    assert measured(picture, kappa=False).displacement_px == pytest.approx(48.0, abs=0.1)
+    healthy = measured(rendered(24.0, 8, bright=True, contrast=0.1, frames=2))
+    assert healthy.kappa == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_frame_delivered_twice_is_refused() -> None:
+    frames = rendered(5.0, 9).frames.copy()
+    frames[3] = frames[2]
+    assert estimate_motion(frames, frame_period_s=PERIOD_S).reason == MotionReason.DUPLICATED
+
+
+@pytest.mark.parametrize("name", ["gear", "corner"])
+def test_row_bands_see_past_what_is_fixed_to_the_airframe(name: str) -> None:
+    picture = rendered(20.0, 10, occluders=(name,))
+    assert measured(picture).displacement_px == pytest.approx(20.0, abs=0.15)
+
+
+def test_without_the_vote_a_landing_gear_is_taken_for_a_wall_at_rest() -> None:
+    picture = rendered(20.0, 10, contrast=0.02, occluders=("gear",))
+    assert measured(picture, consensus=False).displacement_px == pytest.approx(0.0, abs=0.5)
+    voted = measured(picture)
+    assert not voted.accepted or abs(voted.displacement_px - 20.0) < 1.0
+
+
+@pytest.mark.slow
+def test_noise_alone_is_never_a_displacement() -> None:
+    for seed in range(40):
+        pattern = {"pixel_pattern": 0.01} if seed % 2 else {}
+        picture = rendered(7.0, seed, contrast=0.0, camera=pattern)
+        estimate = estimate_motion(picture.frames, frame_period_s=PERIOD_S)
+        assert not estimate.accepted
+        assert estimate.reason in (MotionReason.AMBIGUOUS, MotionReason.STATIC, MotionReason.BANDS)
+
+
+def test_a_prior_narrows_the_search_and_does_not_pull() -> None:
+    picture = rendered(12.0, 11, contrast=0.02)
+    free = estimate_motion(picture.frames, frame_period_s=PERIOD_S)
+    led = estimate_motion(picture.frames, frame_period_s=PERIOD_S, prior_px=(12.4, 0.3))
+    assert led.displacement_px == pytest.approx(free.displacement_px, abs=1e-3)
+    assert led.sigma_px == pytest.approx(free.sigma_px, rel=1e-2)
+    misled = estimate_motion(picture.frames, frame_period_s=PERIOD_S, prior_px=(-20.0, 1.0))
+    assert not misled.accepted
+
+
+def test_equal_frames_give_equal_bits() -> None:
+    picture = rendered(7.7, 12)
+    first, second = (estimate_motion(picture.frames, frame_period_s=PERIOD_S, exposure_s=EXPOSURE_S) for _ in range(2))
+    assert repr(first) == repr(second)
+
+
+def test_deep_pixels_and_colour_say_the_same() -> None:
+    frames = rendered(7.7, 13).frames
+    grey = estimate_motion(frames, frame_period_s=PERIOD_S)
+    deep = estimate_motion(frames.astype(np.uint16) * 16, frame_period_s=PERIOD_S)
+    colour = estimate_motion([np.dstack([f, f, f]) for f in frames], frame_period_s=PERIOD_S)
+    yuyv = estimate_motion([np.dstack([f, np.full_like(f, 128)]) for f in frames], frame_period_s=PERIOD_S)
+    assert deep.displacement_px == pytest.approx(grey.displacement_px, abs=1e-4)
+    assert colour.displacement_px == grey.displacement_px == yuyv.displacement_px
