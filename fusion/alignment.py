@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from axialnav.fusion.config import Config, Initial
 from axialnav.fusion.errors import FlightError
 from axialnav.fusion.events import Events
-from axialnav.fusion.memory import Memory
+from axialnav.fusion.memory import Memory, the_imu
 from axialnav.fusion.sources import Kind, Records
-from axialnav.models.rig import Imu
-from axialnav.models.rotations import quaternion_from_euler
+from axialnav.models.rotations import quaternion_from_euler, rotation_matrix
 from axialnav.models.state import (
     E_ACCEL_BIAS,
     E_ATT,
@@ -63,7 +62,7 @@ def align(config: Config, src: Records, events: Events, memory: Memory) -> None:
     source = int(events.source[is_imu][0])
     samples = events.values[is_imu & window]
     level = level_from_gravity(config, events.t_ns[is_imu & window], samples, src["R_BS"][source])
-    initial = config.initial or _initial_from_uwb(config, src, events, window)
+    initial = config.initial or _initial_from_uwb(config, src, events, window, level)
     x = np.zeros(N_NOMINAL)
     x[POS : POS + 3] = initial.position_m
     x[VEL : VEL + 3] = initial.velocity_m_s
@@ -107,7 +106,7 @@ def _level(force: Array, bias: Array, still_s: float, gravity_m_s2: float) -> Le
 
 def _first_variances(config: Config, initial: Initial, level: Level) -> Array:
     start = config.start
-    imu = next(s for s in config.sensor.values() if isinstance(s, Imu))
+    imu = the_imu(config)
     tilt = start.sigma_tilt_still_rad if level.still_s else start.sigma_tilt_moving_rad
     bias = start.sigma_gyro_bias_rad_s
     if level.still_s:
@@ -125,14 +124,16 @@ def _first_variances(config: Config, initial: Initial, level: Level) -> Array:
     return variances
 
 
-def _initial_from_uwb(config: Config, src: Records, events: Events, window: NDArray[np.bool_]) -> Initial:
+def _initial_from_uwb(config: Config, src: Records, events: Events, window: NDArray[np.bool_], level: Level) -> Initial:
     """First state of a flight that names none: where UWB says, or the origin; standing still; yaw 0."""
     start = config.start
     position, absolute = np.zeros(3), False
     for s in np.flatnonzero(np.isin(src["kind"], UWB_KINDS) & src["enabled"]):
         rows = events.values[window & (events.source == s)]
         if len(rows) >= 3:
-            position, absolute = _locate(int(src["kind"][s]), rows, src["anchors"][s, : src["n_anchors"][s]]), True
+            antenna = _locate(int(src["kind"][s]), rows, src["anchors"][s, : src["n_anchors"][s]])
+            attitude = rotation_matrix(quaternion_from_euler(level.roll_rad, level.pitch_rad, 0.0))
+            position, absolute = antenna - attitude @ src["lever_B"][s], True
             break
     x, y, z = (float(c) for c in position)
     return Initial(
@@ -144,7 +145,7 @@ def _initial_from_uwb(config: Config, src: Records, events: Events, window: NDAr
 
 
 def _locate(kind: int, rows: Array, anchors: Array) -> Array:
-    """Robust position of the antenna [m] from readings of one source taken while standing still."""
+    """Robust position of the antenna [m] from the readings of one source in the first window."""
     from scipy.optimize import least_squares  # only here: costs 0.1 s to import
 
     if kind == int(Kind.UWB_POSITION):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.alignment import align
 from axialnav.fusion.config import Config
 from axialnav.fusion.events import Events, Table, pack_tables
-from axialnav.fusion.handedness import is_undecided, log_likelihood, mirror_config, mirror_tables, mirror_track
+from axialnav.fusion.handedness import explains_better, is_undecided, mirror_config, mirror_tables, mirror_track
 from axialnav.fusion.kernels.run import run
 from axialnav.fusion.kernels.update import MIN_WEIGHT
 from axialnav.fusion.memory import (
@@ -81,7 +81,7 @@ def run_batch(
     result = _run(config, tables, progress)
     if is_undecided(config):
         mirrored = _run_mirrored(config, tables, None)
-        if log_likelihood(mirrored.log) > log_likelihood(result.log) + LEFT_HANDED_EVIDENCE:
+        if explains_better(mirrored.log, result.log) > LEFT_HANDED_EVIDENCE:
             return mirrored
     return result
 

@@ -46,7 +46,10 @@ class Corridor(_Table, frozen=True, kw_only=True):
 
 
 class Initial(_Table, frozen=True, kw_only=True):
-    """First state.  Absent: level from gravity, at the origin, standing still, yaw unknown."""
+    """First state.
+
+    Absent: level from gravity, standing still; where UWB says and with unknown yaw, or at the origin with yaw 0.
+    """
 
     position_m: Vector3
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
@@ -59,8 +62,8 @@ class Initial(_Table, frozen=True, kw_only=True):
 class Gate(_Table, frozen=True, kw_only=True):
     """Acceptance of a reading by its normalised innovation squared.
 
-    ``probability`` is the share of honest readings that pass; between ``soft_sigma`` and the gate the weight of a
-    reading redescends.
+    ``probability`` is the share of honest readings that pass.  Inside the gate the weight of a reading falls from 1 at
+    the centre to 1/4 at ``soft_sigma`` (Geman-McClure).
     """
 
     probability: Probability = 0.999
@@ -122,13 +125,13 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     """Noise of UWB readings.
 
     Errors of neighbouring readings are alike over ``correlation_time_s``; a reading that comes every dt is given the
-    variance ``sigma_m^2 (1 + 2 correlation_time_s / dt)``, so that fast receivers are not believed too much.  Fixes
+    variance ``sigma_m^2 coth(dt / 2 correlation_time_s)``, so that fast receivers are not believed too much.  Fixes
     that a receiver computed itself have ``fix_sigma_m``: they are as good as its geometry, which we cannot see.
     """
 
     sigma_m: Positive = 0.15
     fix_sigma_m: Positive = 1.0
-    correlation_time_s: NonNegative = 0.012
+    correlation_time_s: NonNegative = 0.014
     bias_sigma_m: Positive = 0.002
     bias_time_s: Positive = 10.0
     gate: Gate = Gate(soft_sigma=2.5)
@@ -142,7 +145,7 @@ class FlowTuning(_Table, frozen=True, kw_only=True):
 
     sigma_rad: Positive = 0.0043
     scale_sigma: Positive = 0.03
-    scale_walk: NonNegative = 1e-4
+    scale_walk: NonNegative = 1e-4  # s^-1/2
     min_quality: NonNegative = 1.0
     gate: Gate = Gate(soft_sigma=3.0)
 
@@ -159,7 +162,7 @@ class RangeTuning(_Table, frozen=True, kw_only=True):
 
     sigma_m: Positive = 0.015
     offset_sigma_m: Positive = 1.0
-    offset_walk_m: NonNegative = 1e-3
+    offset_walk_m: NonNegative = 1e-3  # m s^-1/2
     gate: Gate = Gate(soft_sigma=3.0)
 
 
@@ -175,6 +178,26 @@ class AttitudeTuning(_Table, frozen=True, kw_only=True):
 
     sigma_rad: Positive = 0.05
     gate: Gate = Gate()
+
+
+class AxialTuning(_Table, frozen=True, kw_only=True):
+    """The axial estimator: how well tilt tells acceleration, and how the vehicle moves across the corridor.
+
+    ``heading_rad`` is the autopilot's yaw when the vehicle looks along the world's x axis; without it the first
+    attitude is taken to look where ``[initial]`` says.  The error of the axial acceleration is the tilt's error
+    ``sigma_tilt_rad`` times gravity, alike over ``tilt_time_s``; on top comes white noise of ``accel_noise``
+    (accelerometer) or ``thrust_noise`` (tilt alone: drag and climbing are not seen) [m s^-2 Hz^-1/2].  Across the
+    corridor the vehicle is expected to move with ``lateral_speed_m_s``, in stretches of ``lateral_time_s``.
+    """
+
+    heading_rad: float | None = None
+    sigma_tilt_rad: Positive = 0.012
+    tilt_time_s: Positive = 5.0
+    sigma_yaw_rad: Positive = 0.05
+    accel_noise: Positive = 0.05
+    thrust_noise: Positive = 0.5
+    lateral_speed_m_s: Positive = 0.5
+    lateral_time_s: Positive = 1.0
 
 
 class DelayTuning(_Table, frozen=True, kw_only=True):
@@ -213,6 +236,7 @@ class Config(_Table, frozen=True, kw_only=True):
     range: RangeTuning = RangeTuning()
     height: HeightTuning = HeightTuning()
     attitude: AttitudeTuning = AttitudeTuning()
+    axial: AxialTuning = AxialTuning()
     supervisor: SupervisorTuning = SupervisorTuning()
     delay: DelayTuning = DelayTuning()
     disabled: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.alignment import align
 from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
-from axialnav.fusion.errors import AxialnavError
+from axialnav.fusion.errors import AxialnavError, ConfigError
 from axialnav.fusion.events import Events
 from axialnav.fusion.history import History
 from axialnav.fusion.kernels.propagate import propagate_filter
@@ -54,6 +54,10 @@ class NotStartedError(AxialnavError):
     """The state was asked for before the filter had seen enough to start."""
 
 
+class PastStateError(AxialnavError):
+    """The state was asked for at a time before the newest inertial sample."""
+
+
 class CorridorEstimator:
     """Full error-state filter (18 states) behind one door.
 
@@ -61,6 +65,11 @@ class CorridorEstimator:
     ----------
     config
         Sensors, surfaces, first state and noise; ``Config()`` alone describes no sensors and takes no readings.
+
+    Raises
+    ------
+    ConfigError
+        No or several inertial units, a surface that is not described, or a left-handed survey.
 
     Notes
     -----
@@ -71,6 +80,11 @@ class CorridorEstimator:
 
     def __init__(self, config: Config | None = None) -> None:
         self.config = config or Config()
+        if self.config.handedness == "left":
+            raise ConfigError(
+                'handedness = "left" is for replay; on board, mirror the survey: reverse the sign of every y '
+                "(anchors, surfaces, corridor) and of the position that comes out"
+            )
         self._packer = Packer(self.config)
         self._cameras = CameraFeed(self.config)
         self._sources = build_sources(self.config)
@@ -102,11 +116,12 @@ class CorridorEstimator:
         kind = self._sources["kind"][source]
         if not self._sources["enabled"][source]:
             return self._record(reading, Reason.DISABLED)
-        if self._aligned and not self._history.can_hold(reading.t_ns):
+        in_first_window = reading.t_ns <= self._start_ends_ns
+        if self._aligned and (not self._history.can_hold(reading.t_ns) or (in_first_window and self._history.trimmed)):
             self.late[reading.sensor] += 1
             return self._record(reading, Reason.TOO_OLD)
         index = self._history.insert(reading.t_ns, source, values)
-        if reading.t_ns <= self._start_ends_ns:
+        if in_first_window:
             self._aligned = False  # the first window has changed: start again from it
         if not self._aligned:
             if not self._align():
@@ -127,6 +142,8 @@ class CorridorEstimator:
         ------
         NotStartedError
             The filter has not been aligned yet.
+        PastStateError
+            ``t_ns`` lies before the newest inertial sample.
         """
         if not self._aligned:
             raise NotStartedError(
@@ -134,7 +151,13 @@ class CorridorEstimator:
             )
         memory = self._memory.copy()
         core = memory.core[0]
-        now = int(core["t_imu"]) if t_ns is None else int(t_ns)
+        newest = int(core["t_imu"])
+        now = newest if t_ns is None else int(t_ns)
+        if now < newest:
+            raise PastStateError(
+                f"the state at t_ns={now} is {(newest - now) * 1e-6:.1f} ms in the past; ask for {newest} or later, "
+                f"or keep the states as they come"
+            )
         ahead_s = (now - int(core["t_imu"])) * 1e-9
         if ahead_s > 0.0:
             self._scratch["mean_imu"][0] = core["imu"]

@@ -66,13 +66,12 @@ class Events(NamedTuple):
         return Events(self.t_ns[cut], self.source[cut], self.values[cut])
 
 
-def tie_break(values: NDArray[np.float64]) -> tuple[Any, Any, Any]:
-    """Key that orders events of equal stamp and source by their first three values (NaN last).
+def tie_break(values: NDArray[np.float64]) -> tuple[Any, ...]:
+    """Key that orders events of equal stamp and source by their values (NaN last).
 
     Works on one event (8,) or on columns (8, n); makes the order of processing independent of the order of arrival.
     """
-    first = np.where(np.isnan(values[:3]), np.inf, values[:3])
-    return (first[0], first[1], first[2])
+    return tuple(np.where(np.isnan(values), np.inf, values))
 
 
 def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
@@ -91,7 +90,7 @@ def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
         return Events(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WIDTH)))
     t_ns, source, value = np.concatenate(stamps), np.concatenate(sources), np.concatenate(values)
     ties = tie_break(value.T)
-    order = np.lexsort((ties[2], ties[1], ties[0], source, t_ns))
+    order = np.lexsort((*reversed(ties), source, t_ns))
     return Events(t_ns[order], source[order], np.ascontiguousarray(value[order]))
 
 

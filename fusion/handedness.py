@@ -95,14 +95,18 @@ def mirror_track(track: Track) -> Track:
 
 def is_undecided(config: Config) -> bool:
     """Whether a replay has to find the handedness: it may, and neither start nor heading is given."""
-    surveyed = any(
-        isinstance(s, Uwb) and s.anchors and name not in config.disabled for name, s in config.sensor.items()
-    )
+    surveyed = any(isinstance(s, Uwb) and name not in config.disabled for name, s in config.sensor.items())
     return config.handedness == "auto" and config.initial is None and surveyed
 
 
-def log_likelihood(log: InnovationLog) -> float:
-    """Bounded log-likelihood of all readings: how well a run explains them."""
-    used = log.dof > 0
+def log_likelihood(log: InnovationLog, used: NDArray[np.bool_] | None = None) -> float:
+    """Bounded log-likelihood of the readings ``used`` (default: all that were predicted)."""
+    used = log.dof > 0 if used is None else used
     nis = np.minimum(log.nis[used], log.gate[used])
     return float(-0.5 * (nis + np.nansum(np.log(log.variance[used]), axis=1)).sum())
+
+
+def explains_better(mirrored: InnovationLog, plain: InnovationLog) -> float:
+    """Log-likelihood of the mirrored run minus that of the plain one, over the readings that both predicted."""
+    both = (mirrored.dof > 0) & (plain.dof > 0)
+    return log_likelihood(mirrored, both) - log_likelihood(plain, both)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from axialnav.fusion.events import tie_break
 from axialnav.fusion.memory import Memory
 
 Array = NDArray[np.float64]
-Key = tuple[int, int, float, float, float]
+Key = tuple[Any, ...]  # stamp [ns], source, values
 
 
 @dataclass(slots=True)
@@ -30,12 +31,12 @@ class Entry:
     @property
     def t_ns(self) -> int:
         """Stamp [ns]."""
-        return self.key[0]
+        return int(self.key[0])
 
     @property
     def source(self) -> int:
         """Index of the source."""
-        return self.key[1]
+        return int(self.key[1])
 
 
 @dataclass(slots=True)
@@ -45,6 +46,7 @@ class History:
     reach_ns: int
     stride: int = 16
     entries: list[Entry] = field(default_factory=list)
+    trimmed: bool = False  # whether anything has been forgotten yet
 
     def can_hold(self, t_ns: int) -> bool:
         """Whether a reading of that stamp can still be put into order."""
@@ -93,4 +95,5 @@ class History:
                 break
             if entry.before is not None:
                 cut = index
+        self.trimmed = self.trimmed or cut > 0
         del self.entries[:cut]

@@ -31,6 +31,7 @@ MEMORY: Final = np.dtype(
         ("t_flow", "i8"),  # last pixel motion
         ("started", "i8"),
         ("resets", "i8"),
+        ("t_reset", "i8"),
         ("last_reset_m", "f8", 3),
         ("imu_fault", "i8"),
         ("on_trial", "i8"),
@@ -47,7 +48,7 @@ SOURCE_MEMORY: Final = np.dtype(
     [
         ("t_seen", "i8"),
         ("t_fused", "i8"),
-        ("t_trusted", "i8"),  # last time the mean weight was good
+        ("t_trusted", "i8"),  # last time the mean weight was good, or the source came back from silence
         ("gap_s", "f8"),  # mean time between readings
         ("datum_m", "f8"),  # zero of a height sensor
         ("trust", "f8"),  # mean weight
@@ -108,10 +109,24 @@ def new_scratch() -> Records:
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
     "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_variance", "uwb_bias_time_s",
-    "wall_offset_walk", "uwb_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s", "evidence", "trials_to_clear", "evidence_to_clear",
-    "dead_reckoning_s", "invalid_s", "reanchor_aided_s", "reanchor_alone_s",
+    "wall_offset_walk", "uwb_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s", "evidence", "trials_to_clear",
+    "evidence_to_clear", "dead_reckoning_s", "invalid_s", "reanchor_aided_s", "reanchor_alone_s",
 )  # fmt: skip
 SETTINGS: Final = np.dtype([(name, "f8") for name in SETTINGS_FIELDS])
+
+
+def the_imu(config: Config) -> Imu:
+    """Description of the one inertial unit that drives the filter.
+
+    Raises
+    ------
+    ConfigError
+        Not exactly one enabled inertial unit.
+    """
+    imus = [s for name, s in config.sensor.items() if isinstance(s, Imu) and name not in config.disabled]
+    if len(imus) != 1:
+        raise ConfigError(f"the filter needs exactly one inertial unit, got {len(imus)}; add or disable [sensor.imuN]")
+    return imus[0]
 
 
 def build_settings(config: Config) -> Records:
@@ -122,10 +137,7 @@ def build_settings(config: Config) -> Records:
     ConfigError
         Not exactly one enabled inertial unit.
     """
-    imus = [s for name, s in config.sensor.items() if isinstance(s, Imu) and name not in config.disabled]
-    if len(imus) != 1:
-        raise ConfigError(f"the filter needs exactly one inertial unit, got {len(imus)}; add or disable [sensor.imuN]")
-    imu, tune, fault = imus[0], config.imu, config.imu_fault
+    imu, tune, fault = the_imu(config), config.imu, config.imu_fault
     accel = (imu.accel_noise_density * tune.accel_noise_scale) ** 2
     axis = config.axis
     values: dict[str, Any] = {

@@ -53,7 +53,7 @@ def _sigma(reading: Reading, field: str, value: float | None) -> None:
 
 
 class ImuSample(Reading, frozen=True, kw_only=True):
-    """Angular rate and specific force in IMU axes; the filter holds each sample until the next."""
+    """Angular rate and specific force in IMU axes; over a step the filter takes the mean of its two ends."""
 
     gyro_rad_s: Vector3
     accel_m_s2: Vector3

@@ -54,7 +54,8 @@ class _PackageCacheFile(IndexDataCacheFile):  # type: ignore[misc]
 def kernel(function: F) -> F:
     """Compile ``function`` to machine code at first use and keep the result on disk until any source changes."""
     compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
-    cache = compiled._cache
-    cache._cache_file = _PackageCacheFile(cache._cache_path, cache._impl.filename_base)
+    cache = getattr(compiled, "_cache", None)  # there is none with NUMBA_DISABLE_JIT=1
+    if cache is not None:
+        cache._cache_file = _PackageCacheFile(cache._cache_path, cache._impl.filename_base)
     result: F = compiled
     return result

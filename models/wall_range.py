@@ -27,7 +27,8 @@ def wall_range(
 ) -> float:
     """Predict the range along the beam [m] and write its Jacobian row into ``H`` (18,).
 
-    Returns NaN where the beam does not meet the surface (blind, not wrong); ``work`` (8,) is scratch.
+    Returns NaN where the beam points away from the surface (blind, not wrong), and a negative range where the estimate
+    lies behind it, so that a reading can bring it back; ``work`` (8,) is scratch.
     """
     if not distance_along_ray(p_W, R_WB, lever_B, R_BS[:, 2], normal_W, offset_m, work) > MIN_COSINE:
         return np.nan

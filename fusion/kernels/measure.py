@@ -26,6 +26,7 @@ UNKNOWN_ANCHOR, SIGN_UNCERTAIN, TOO_SHORT = (
     int(Reason.TOO_SHORT),
 )
 NO_MOTION = int(Reason.NO_MOTION)
+TURN = 2.0 * np.pi
 SIGN_SIGMAS = 2.0
 
 
@@ -58,10 +59,16 @@ def measure(s: Record, seen: Record, values: Array, x: Array, P: Array, m: Recor
         w.variance[0] = variance_of(values[1], s.sigma)
         return 1
     for i in range(2):
-        w.z[i] = values[i]
         w.h[i] = tilt(w.R, i, w.H[i])
+        w.z[i] = w.h[i] + wrapped(values[i] - w.h[i])
         w.variance[i] = variance_of(values[3], s.sigma)
     return 2
+
+
+@kernel
+def wrapped(angle: float) -> float:
+    """The same angle within -pi..pi [rad]."""
+    return float(angle - TURN * round(angle / TURN))
 
 
 @kernel

@@ -10,9 +10,21 @@ from numpy.typing import NDArray
 from axialnav.fusion.kernels.covariance import predict_covariance
 from axialnav.models.imu import strapdown
 from axialnav.models.jit import Record, kernel
-from axialnav.models.state import E_ACCEL_BIAS, E_ATT, E_BLUR_SCALE, E_GYRO_BIAS, E_UWB_BIAS, E_VEL, E_WALL_OFFSET
+from axialnav.models.state import (
+    E_ACCEL_BIAS,
+    E_ATT,
+    E_BLUR_SCALE,
+    E_GYRO_BIAS,
+    E_POS,
+    E_UWB_BIAS,
+    E_VEL,
+    E_WALL_OFFSET,
+)
 
 Array = NDArray[np.float64]
+MAX_IMU_GAP_S = 0.1
+GAP_ACCEL_VARIANCE = 9.0  # [m^2 s^-3] manoeuvres of 3 m/s^2 that last half a second
+GAP_GYRO_VARIANCE = 0.25  # [rad^2 s^-1] turns of 0.5 rad/s that last half a second
 
 
 @kernel
@@ -29,9 +41,17 @@ def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: 
     strapdown(m.x[row], w.mean_imu[0:3], w.mean_imu[3:6], dt, c.gravity_m_s2, w.R, w.F)
     accel = c.fault_accel_variance if fault else c.accel_variance
     accel_walk = c.fault_accel_walk if fault else c.accel_walk
+    gyro = c.gyro_variance
+    unseen = 0.0
+    if dt > MAX_IMU_GAP_S:
+        # nobody knows how the vehicle moved between the two samples
+        accel += GAP_ACCEL_VARIANCE
+        gyro += GAP_GYRO_VARIANCE
+        unseen = GAP_ACCEL_VARIANCE * dt * dt * dt / 3.0
     for i in range(3):
+        w.Q[E_POS + i] = unseen
         w.Q[E_VEL + i] = accel * dt
-        w.Q[E_ATT + i] = c.gyro_variance * dt
+        w.Q[E_ATT + i] = gyro * dt
         w.Q[E_GYRO_BIAS + i] = c.gyro_walk * dt
         w.Q[E_ACCEL_BIAS + i] = accel_walk * dt
     decay = math.exp(-dt / c.uwb_bias_time_s)

@@ -1,4 +1,4 @@
-"""Recovery from lock-out: when a UWB source is refused for long though it moves as we do, move the position to it.
+"""Recovery from lock-out: where a UWB source is refused for long and one offset explains it, move the position to it.
 
 Only the position is moved, its covariance opened and its correlations cut; velocity and tilt are never reset by UWB.
 The offset comes from a fading least-squares fit of position to the refused readings, so any mix of ranges, range
@@ -17,6 +17,7 @@ from axialnav.models.state import E_POS, N_ERROR, POS
 
 Array = NDArray[np.float64]
 FIT_TIME_S = 1.0
+SILENCE_S = 1.0
 TRUST_TIME_S = 0.5
 TRUSTED = 0.2  # mean weight below which a source counts as refused
 EXPLAINED = 0.8  # share of the squared innovations that one offset must explain
@@ -32,9 +33,9 @@ def observe_source(t_ns: int, gap_s: float, axes: int, weight: float, seen: Reco
     fade = math.exp(-step / FIT_TIME_S)
     blend = min(step / TRUST_TIME_S, 1.0)
     seen.trust += blend * (weight - seen.trust)
-    if seen.trust > TRUSTED:
-        seen.t_trusted = t_ns
-    _fade_fit(fade, seen)
+    if seen.trust > TRUSTED or gap_s > SILENCE_S:
+        seen.t_trusted = t_ns  # silence is no refusal: patience starts with the first reading after it
+    _fade_fit(0.0 if gap_s > SILENCE_S else fade, seen)
     for i in range(axes):
         y = w.z[i] - w.h[i]
         if abs(y) > MAX_INNOVATION_M:
@@ -74,6 +75,7 @@ def reanchor(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> bool:
     for a in range(3):
         m.last_reset_m[a] = w.y[a]
     m.resets += 1
+    m.t_reset = t_ns
     seen.t_trusted = t_ns
     seen.trust = 1.0
     _fade_fit(0.0, seen)

@@ -72,6 +72,8 @@ def _take_over(m: Record) -> None:
     m.imu_fault = 1 - m.imu_fault
     m.on_trial = 0
     m.good_trials = 0
+    for i in range(3):
+        m.correction_rate[i] = 0.0
     copy_filter(m.x[1], m.P[1], m.x[0], m.P[0])
 
 

@@ -34,8 +34,10 @@ Ints = NDArray[np.int64]
 
 DEAD_RECKONING, VELOCITY_INVALID = int(Health.DEAD_RECKONING), int(Health.VELOCITY_INVALID)
 ACCELEROMETER_FAULT, UWB_SUSPECT = int(Health.ACCELEROMETER_FAULT), int(Health.UWB_SUSPECT)
+POSITION_RESET = int(Health.POSITION_RESET)
 NOT_ALIGNED = int(Reason.NOT_ALIGNED)
 GAP_BLEND = 0.02
+RESET_SHOWN_S = 1.0
 SUSPECT_TRUST = 0.1
 
 
@@ -82,10 +84,13 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
     gap_s = (t_ns - seen.t_seen) * 1e-9
     _note_arrival(t_ns, gap_s, kind, values, seen, m)
     # the rival first, so that the record and the scratch left behind are the estimate's
+    evidence, both_used = 0.0, m.on_trial == 1
     for row in range(m.on_trial, -1, -1):
         likelihood = fuse(row, t_ns, s, seen, values, m, w, c)
-        if m.on_trial == 1:
-            m.evidence += likelihood if row == 1 else -likelihood
+        evidence += likelihood if row == 1 else -likelihood
+        both_used = both_used and w.row[LOG_CODE] > 0.0
+    if both_used:
+        m.evidence += evidence
     for k in range(LOG_WIDTH):
         log[k] = w.row[k]
     used = log[LOG_CODE] > 0.0 and log[LOG_WEIGHT] > MIN_WEIGHT
@@ -125,6 +130,8 @@ def health(t_ns: int, sources: Records, memory: Records, m: Record, c: Record) -
         flags |= VELOCITY_INVALID
     if m.imu_fault == 1:
         flags |= ACCELEROMETER_FAULT
+    if m.resets > 0 and (t_ns - m.t_reset) * 1e-9 < RESET_SHOWN_S:
+        flags |= POSITION_RESET
     for i in range(sources.shape[0]):
         if is_uwb(sources[i].kind) and memory[i].trust < SUSPECT_TRUST:
             flags |= UWB_SUSPECT

@@ -38,8 +38,14 @@ def redescend(nis_per_axis: float, soft_nis: float) -> float:
 
 @kernel
 def repetition(gap_s: float, correlation_s: float) -> float:
-    """How many readings that come every ``gap_s`` say the same thing: 1 + 2 tau / dt."""
-    return 1.0 + 2.0 * correlation_s / gap_s if gap_s > 0.0 else 1.0
+    """How many readings that come every ``gap_s`` say the same thing.
+
+    Errors with the correlation exp(-dt / tau) average as slowly as white ones of a variance coth(dt / 2 tau) times
+    larger: 1 for slow sources, 2 tau / dt for fast ones.
+    """
+    if gap_s <= 0.0 or correlation_s <= 0.0:
+        return 1.0
+    return 1.0 / math.tanh(0.5 * gap_s / correlation_s)
 
 
 @kernel
