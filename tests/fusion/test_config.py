@@ -89,7 +89,7 @@ def test_any_configuration_survives_toml_to_the_last_bit(config: Config) -> None
         ({"surface": {"wall": {"normal": [0.0, 0.0, 1.0], "offset_m": "far"}}}, "offset_m"),
         ({"corridor": {"axis": [0.0, 0.0, 0.0]}}, "corridor axis must point somewhere"),
         ({"initial": {"position_m": [0.0, math.nan, 0.0]}}, "initial.position_m.1 must be a finite number"),
-        ({"sensor": {"u": {"kind": "uwb", "anchors": {"a": [math.nan, 0, 0]}}}}, "sensor.u.anchors.a.0 must be a finite number"),
+        ({"sensor": {"u": {"kind": "uwb", "anchors": {"a": [math.nan, 0, 0]}}}}, "sensor.u.anchors.a.0 must be"),
         ({"handedness": "both"}, "both"),
         ({"initial": {"yaw_rad": 1.0}}, "position_m"),
     ],

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.config import Config, Gate, UwbTuning
 from axialnav.fusion.kernels.update import redescend, repetition
-from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.sources import build_sources
 from axialnav.models.rig import Imu, Uwb
 
