@@ -11,7 +11,7 @@ from axialnav.fusion.alignment import align
 from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import AxialnavError, ConfigError
-from axialnav.fusion.events import Events
+from axialnav.fusion.events import WIDTH, Events
 from axialnav.fusion.history import History
 from axialnav.fusion.kernels.propagate import propagate_filter
 from axialnav.fusion.kernels.run import health, run
@@ -33,7 +33,7 @@ from axialnav.fusion.memory import (
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
 from axialnav.fusion.packing import Packer
 from axialnav.fusion.readings import CameraFrame, Reading
-from axialnav.fusion.sources import Kind, build_sources
+from axialnav.fusion.sources import Kind, Records, build_sources
 from axialnav.models.state import (
     ACCEL_BIAS,
     BLUR_SCALE,
@@ -89,6 +89,10 @@ class CorridorEstimator:
         self._cameras = CameraFeed(self.config)
         self._sources = build_sources(self.config)
         self._settings = build_settings(self.config)
+        # plain lists and one-event buffers: indexing records and making arrays would cost more than the filter itself
+        self._is_imu: list[bool] = (self._sources["kind"] == int(Kind.IMU)).tolist()
+        self._enabled: list[bool] = self._sources["enabled"].tolist()
+        self._event = Events(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, WIDTH)))
         self._scratch = new_scratch()
         self._memory = new_memory(len(self._sources))
         self._history = History(reach_ns=round(self.config.delay.buffer_s * 1e9))
@@ -113,8 +117,7 @@ class CorridorEstimator:
             motion = self._cameras.push(reading)
             return self.push(motion) if motion is not None else self._record(reading, Reason.NO_MOTION)
         source, values = self._packer.pack(reading)
-        kind = self._sources["kind"][source]
-        if not self._sources["enabled"][source]:
+        if not self._enabled[source]:
             return self._record(reading, Reason.DISABLED)
         in_first_window = reading.t_ns <= self._start_ends_ns
         if self._aligned and (not self._history.can_hold(reading.t_ns) or (in_first_window and self._history.trimmed)):
@@ -133,7 +136,7 @@ class CorridorEstimator:
             start, self._memory = self._history.rewind(index)
             self._run_from(start, index)
         self._history.forget(self._start_ends_ns)
-        return self._record(reading, Reason.NONE) if kind == Kind.IMU else self._record_update(reading)
+        return self._record(reading, Reason.NONE) if self._is_imu[source] else self._record_update(reading)
 
     def state(self, t_ns: int | None = None) -> AxialState:
         """State at ``t_ns`` (default: the newest inertial sample), carried forward with the last sample.
@@ -165,11 +168,16 @@ class CorridorEstimator:
         flags = health(now, self._sources, memory.sources, memory.core[0], self._settings[0])
         return self._axial_state(now, memory, Health(flags))
 
+    def _build_settings(self) -> Records:
+        return build_settings(self.config)
+
     def _align(self) -> bool:
         """Find the first state once inertial samples span the first window; all events are then waiting to be run."""
         entries = self._history.entries
-        imu = [e.t_ns for e in entries if self._sources["kind"][e.source] == Kind.IMU]
         window_ns = round(self.config.start.window_s * 1e9)
+        if entries[-1].t_ns <= entries[0].t_ns + window_ns:
+            return False
+        imu = [e.t_ns for e in entries if self._is_imu[e.source]]
         if not imu or imu[-1] <= imu[0] + window_ns:
             return False
         held = Events(
@@ -197,9 +205,10 @@ class CorridorEstimator:
 
     def _run(self, t_ns: int, source: int, values: Array) -> None:
         self._log[:] = 0.0
+        self._event.t_ns[0], self._event.source[0], self._event.values[0] = t_ns, source, values
         run(
-            np.array([t_ns]), np.array([source]), values[None, :], self._sources, self._memory.core,
-            self._memory.sources, self._scratch, self._settings, self._track, self._log,
+            *self._event, self._sources, self._memory.core, self._memory.sources, self._scratch, self._settings,
+            self._track, self._log,
         )  # fmt: skip
 
     def _record(self, reading: Reading, reason: Reason) -> Outcome:

@@ -6,6 +6,7 @@ of stamps.  The same readings in any order of arrival within the ring therefore 
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.fusion.events import tie_break
 from axialnav.fusion.memory import Memory
 
 Array = NDArray[np.float64]
@@ -53,8 +53,14 @@ class History:
         return not self.entries or t_ns >= self.entries[0].t_ns
 
     def insert(self, t_ns: int, source: int, values: Array) -> int:
-        """Put an event where it belongs; return its index."""
-        key = (t_ns, source, *tie_break(values))
+        """Put an event where it belongs; return its index.
+
+        Ties are broken as :func:`axialnav.fusion.events.tie_break` does for whole tables.
+        """
+        key = (t_ns, source, *[math.inf if math.isnan(v) else v for v in values.tolist()])
+        if not self.entries or key >= self.entries[-1].key:
+            self.entries.append(Entry(key, values))
+            return len(self.entries) - 1
         index = bisect_right(self.entries, key, key=lambda entry: entry.key)
         self.entries.insert(index, Entry(key, values))
         return index
@@ -75,9 +81,10 @@ class History:
 
     def remember(self, index: int, memory: Memory) -> None:
         """Keep a snapshot before the event at ``index`` if the last one is ``stride`` events back."""
-        nearby = self.entries[max(index - self.stride + 1, 0) : index + 1]
-        if all(entry.before is None for entry in nearby):
-            self.entries[index].before = memory.copy()
+        for at in range(index, max(index - self.stride, -1), -1):
+            if self.entries[at].before is not None:
+                return
+        self.entries[index].before = memory.copy()
 
     def forget(self, keep_from_ns: int) -> None:
         """Drop what is older than the ring reaches, but nothing from ``keep_from_ns`` on while that is in reach.

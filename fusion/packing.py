@@ -38,6 +38,9 @@ KIND_OF_READING: dict[type[Reading], Kind] = {
 }
 
 
+_NOT_GIVEN = (nan,) * WIDTH
+
+
 class Packer:
     """Turns typed readings of the configured sensors into event rows."""
 
@@ -72,10 +75,8 @@ class Packer:
                 f"{type(reading).__name__} from {name}, which is configured as a source of "
                 f"{expected.name if expected is not None else 'nothing'}; send it under another sensor name"
             )
-        row = np.full(WIDTH, nan)
         values = self._values(reading)
-        row[: len(values)] = values
-        return self._sources[name], row
+        return self._sources[name], np.array(values + _NOT_GIVEN[len(values) :])
 
     def _values(self, reading: Reading) -> tuple[float, ...]:
         match reading:
