@@ -12,14 +12,15 @@ from axialnav.estimators.frames import Image
 from axialnav.estimators.positions import centred_times
 from axialnav.estimators.rows import apply_window, bin_columns, fast_length, hann
 from axialnav.estimators.search import lag_sums, profiles, unrelated_spread
-from axialnav.estimators.spectrum import Band, pair_count, pair_products, power, row_spectra
+from axialnav.estimators.spectrum import Band, all_pair_products, pair_count, power, row_spectra
 from axialnav.estimators.texture import matched_weight, shape_family, texture_power
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
 COLUMNS = 48
 COLUMN_WIDTH = 8
-REACH_PX = 12.0
+REACH_PX = 24.0
+MANY_FRAMES = 5
 STEP_PX = 0.25
 MIN_SIGNIFICANCE = 6.0
 NOISE_SHARE = 0.85
@@ -59,8 +60,17 @@ class DriftMeter:
     def measure(self, images: list[Image], displacement_px: float) -> Drift:
         """Drift of frames (oldest first) whose wall moves by ``displacement_px`` per frame along the rows.
 
-        The columns follow the wall, or there would be nothing in common between them.
+        The columns follow the wall, or there would be nothing in common between them.  Of many frames the first, the
+        middle and the last are asked.
         """
+        lag = 1
+        if len(images) >= MANY_FRAMES:
+            lag = (len(images) - 1) // 2
+            images, displacement_px = images[: 2 * lag + 1 : lag], displacement_px * lag
+        found = self._measure(images, displacement_px)
+        return Drift(found.cross_px / lag, found.seen)
+
+    def _measure(self, images: list[Image], displacement_px: float) -> Drift:
         offset = np.rint(displacement_px * centred_times(len(images))).astype(np.int64)
         offset -= offset.min()
         room = images[0].shape[1] - int(offset.max()) - self._count * self._width
@@ -98,14 +108,8 @@ class DriftMeter:
 
     def _products(self, frames: int) -> tuple[Plane, Plane]:
         out = np.empty((2, 1, pair_count(frames), self.band.count), dtype=np.float32)
-        re, im = self._spectra
-        part = np.empty((2, 1, self.band.count), dtype=np.float32)
-        p = 0
-        for i in range(frames):
-            for j in range(i + 1, frames):
-                pair_products(re[i], im[i], re[j], im[j], self._edges, part[0], part[1])
-                out[:, :, p] = part
-                p += 1
+        re, im = self._spectra[0, :frames], self._spectra[1, :frames]
+        all_pair_products(re, im, self._edges, out[0], out[1])
         return out[0], out[1]
 
 

@@ -69,12 +69,12 @@ def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[
     omega = 2.0 * np.pi * band.frequency()
     shapes = shape_family(band.first, band.count, band.length) * blur_power(blur_px, band.frequency())
     re, im, power = products.re.sum(axis=0), products.im.sum(axis=0), products.power.sum(axis=0, dtype=np.float64)
-    pairs = np.empty(band.count)
+    pairs = np.empty_like(power)
+    coherent_power(re, im, omega, position_px, pairs)
     texture, noise, coherent_part = np.empty_like(power), np.empty_like(power), np.empty_like(power)
     for c in range(len(rows)):
         mean_power = power[c] / (frames * rows[c])
-        coherent_power(re[c], im[c], omega, position_px, pairs)
-        coherent = mean_power / frames + 2.0 * pairs / (frames**2 * rows[c])
+        coherent = mean_power / frames + 2.0 * pairs[c] / (frames**2 * rows[c])
         incoherent = (mean_power - coherent) * frames / (frames - 1)
         noise[c] = smooth_noise(incoherent, NOISE_FLOOR * float(mean_power.mean()) + TINY)
         coherent_part[c] = coherent - noise[c] / frames
@@ -159,8 +159,8 @@ def sandwich(score: Array, J: Array) -> Array:
 def best_bend(products: Products, fit: Fit) -> float:
     """Change of the displacement per frame [px] from a coarse look around a fit without one."""
     basis = motion_basis(products.frames, True)
-    re, im = (plane.sum(axis=0, dtype=np.float64) for plane in products.weighted(fit.weight))
-    omega, pairs = 2.0 * np.pi * products.band.frequency(), np.empty(products.band.count)
+    re, im = (plane.sum(axis=0, keepdims=True) for plane in products.weighted(fit.weight))
+    omega, pairs = 2.0 * np.pi * products.band.frequency(), np.empty((1, products.band.count))
 
     def gain(bend: float) -> float:
         coherent_power(re, im, omega, basis @ np.array([fit.motion[0], bend]) - products.offset_px, pairs)

@@ -87,13 +87,20 @@ def motion_basis(frames: int, accelerated: bool) -> Array:
 
 @kernel
 def coherent_power(re: Plane, im: Plane, omega: Array, position: Array, out: Array) -> None:
-    """Sum ``Re E_ij`` over all pairs for every frequency: (p, f) products of all strips to ``out`` (f,)."""
-    frames = position.shape[0]
-    for f in range(omega.shape[0]):
-        out[f] = 0.0
+    """Sum ``Re E_ij`` over all pairs for every frequency: products (c, p, f) to ``out`` (c, f)."""
+    frames, count = position.shape[0], omega.shape[0]
+    cosine, sine = np.empty((frames, count)), np.empty((frames, count))
+    for k in range(frames):
+        for f in range(count):
+            cosine[k, f] = np.cos(omega[f] * position[k])
+            sine[k, f] = np.sin(omega[f] * position[k])
+    out[:] = 0.0
+    for c in range(re.shape[0]):
         p = 0
         for i in range(frames):
             for j in range(i + 1, frames):
-                angle = omega[f] * (position[i] - position[j])
-                out[f] += re[p, f] * np.cos(angle) - im[p, f] * np.sin(angle)
+                for f in range(count):
+                    turn_re = cosine[i, f] * cosine[j, f] + sine[i, f] * sine[j, f]
+                    turn_im = sine[i, f] * cosine[j, f] - cosine[i, f] * sine[j, f]
+                    out[c, f] += re[c, p, f] * turn_re - im[c, p, f] * turn_im
                 p += 1

@@ -72,23 +72,26 @@ def bin_rows(frame: NDArray[np.uint8], first_row: int, height: int, out: Plane) 
 
 @kernel
 def bin_columns(frame: NDArray[np.uint8], first_column: int, width: int, step: int, out: Plane) -> None:
-    """Sum ``width`` columns, every ``step`` columns, into the rows of ``out`` (c, h): a transposed, binned frame."""
+    """Sum ``width`` columns, every ``step`` columns, into the rows of ``out`` (c, h): a transposed, binned frame.
+
+    The caller sees to it that ``first_column + (c - 1) step + width`` columns exist.
+    """
     count, height = out.shape
-    last = frame.shape[1] - 1
+    sums = np.empty((height, count), dtype=np.uint32)
+    mean = np.zeros(count)
     for r in range(height):
         line = frame[r]
         for c in range(count):
             total = np.uint32(0)
-            for k in range(width):
-                total += np.uint32(line[min(max(first_column + c * step + k, 0), last)])
-            out[c, r] = np.float32(total)
+            start = first_column + c * step
+            for k in range(start, start + width):
+                total += np.uint32(line[k])
+            sums[r, c] = total
+            mean[c] += total
     for c in range(count):
-        mean = np.float32(0.0)
+        level = np.float32(mean[c] / height)
         for r in range(height):
-            mean += out[c, r]
-        mean /= np.float32(height)
-        for r in range(height):
-            out[c, r] -= mean
+            out[c, r] = np.float32(sums[r, c]) - level
 
 
 @kernel

@@ -99,6 +99,29 @@ def pair_products(
 
 
 @kernel
+def _add_product(a: Plane, b: Plane, c: Plane, d: Plane, out_re: Plane, out_im: Plane) -> None:
+    """Add ``(a + i b) conj(c + i d)``, all (f,): a function of its own, so that the compiler sees plain arrays."""
+    for f in range(a.shape[0]):
+        out_re[f] += a[f] * c[f] + b[f] * d[f]
+        out_im[f] += b[f] * c[f] - a[f] * d[f]
+
+
+@kernel
+def all_pair_products(re: Plane, im: Plane, edges: NDArray[np.int64], out_re: Plane, out_im: Plane) -> None:
+    """:func:`pair_products` of every pair of frames: spectra (n, r, f), outputs (s, p, f)."""
+    frames = re.shape[0]
+    out_re[:] = np.float32(0.0)
+    out_im[:] = np.float32(0.0)
+    for s in range(edges.shape[0] - 1):
+        p = 0
+        for i in range(frames):
+            for j in range(i + 1, frames):
+                for r in range(edges[s], edges[s + 1]):
+                    _add_product(re[i, r], im[i, r], re[j, r], im[j, r], out_re[s, p], out_im[s, p])
+                p += 1
+
+
+@kernel
 def power(re: Plane, im: Plane, edges: NDArray[np.int64], out: Plane) -> None:
     """Sums of ``|Y|^2`` over the rows of every strip, shape (s, f)."""
     for s in range(edges.shape[0] - 1):

@@ -15,6 +15,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.models.jit import kernel
+
 Array = NDArray[np.float64]
 SLOPES = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 LENS_SIGMAS_PX = (0.3, 0.7, 1.2, 2.0)
@@ -85,20 +87,37 @@ def texture_power(power: Array, noise: Array, looks: int, shapes: Array) -> Arra
     Whittle's likelihood; the amplitude of every candidate by iterated weighted least squares, never below its own
     standard deviation, so that a texture lost in the noise keeps a weight.
     """
-    grouped = group_means(np.vstack([power[None], noise[None], shapes]))
-    p, n, g = grouped[0], grouped[1], grouped[2:]
-    sizes = np.diff(np.append(group_starts(power.shape[-1]), power.shape[-1]))
-    total = np.maximum(p, n)
-    amplitude = np.ones((g.shape[0], 1))
-    for _ in range(PASSES):
-        weight = sizes / total**2
-        information = np.sum(weight * g * g, axis=1, keepdims=True)
-        amplitude = np.sum(weight * (p - n) * g, axis=1, keepdims=True) / information
-        amplitude = np.maximum(amplitude, 1.0 / np.sqrt(information * looks))
-        total = n + amplitude * g
-    cost = np.sum(sizes * (np.log(total) + p / total), axis=1)
-    best = int(np.argmin(cost))
-    return np.asarray(amplitude[best, 0] * shapes[best])
+    starts = group_starts(power.shape[0])
+    sizes = np.diff(np.append(starts, power.shape[0])).astype(np.float64)
+    best, amplitude = _best_shape(group_means(power), group_means(noise), group_means(shapes), sizes, float(looks))
+    return np.asarray(amplitude * shapes[best])
+
+
+@kernel
+def _best_shape(p: Array, n: Array, shapes: Array, sizes: Array, looks: float) -> tuple[int, float]:
+    """Number and amplitude of the best shape (m, g) for grouped power and noise (g,) with group sizes (g,)."""
+    groups = p.shape[0]
+    total = np.empty(groups)
+    best, best_amplitude, least = 0, 0.0, np.inf
+    for m in range(shapes.shape[0]):
+        amplitude = 0.0
+        for g in range(groups):
+            total[g] = max(p[g], n[g])
+        for _ in range(PASSES):
+            information, match = 0.0, 0.0
+            for g in range(groups):
+                weighted = sizes[g] * shapes[m, g] / (total[g] * total[g])
+                information += weighted * shapes[m, g]
+                match += weighted * (p[g] - n[g])
+            amplitude = max(match / information, 1.0 / np.sqrt(information * looks))
+            for g in range(groups):
+                total[g] = n[g] + amplitude * shapes[m, g]
+        cost = 0.0
+        for g in range(groups):
+            cost += sizes[g] * (np.log(total[g]) + p[g] / total[g])
+        if cost < least:
+            best, best_amplitude, least = m, amplitude, cost
+    return best, best_amplitude
 
 
 def matched_weight(texture: Array, noise: Array, frames: int) -> Array:

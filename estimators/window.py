@@ -12,7 +12,7 @@ from axialnav.estimators.frames import Image
 from axialnav.estimators.layout import STRIPS, RowLayout, haar_rows
 from axialnav.estimators.products import Products
 from axialnav.estimators.rows import apply_window, bin_height, bin_rows, fast_length, hann, tukey
-from axialnav.estimators.spectrum import Band, pair_count, pair_products, power, row_spectra
+from axialnav.estimators.spectrum import Band, all_pair_products, pair_count, pair_products, power, row_spectra
 
 Plane = NDArray[np.float32]
 
@@ -42,7 +42,7 @@ class FrameWindow:
         self._rows = np.zeros((frames, rows, width), dtype=np.float32)
         self._binned = np.zeros((rows, width), dtype=np.float32)
         self._work = np.zeros((1 << self.layout.levels, width), dtype=np.float32)
-        self._buffers = _Buffers(rows, width, frames)
+        self._buffers = _Buffers(rows, width, frames, groups)
         self._re = np.zeros((frames, rows, count), dtype=np.float32)
         self._im = np.zeros_like(self._re)
         self._power = np.zeros((frames, groups, count), dtype=np.float32)
@@ -113,11 +113,12 @@ class FrameWindow:
 class _Buffers:
     """Scratch as wide as a frame; narrower windows use a part of it."""
 
-    def __init__(self, rows: int, width: int, frames: int) -> None:
+    def __init__(self, rows: int, width: int, frames: int, groups: int) -> None:
+        self._pairs = np.zeros(groups * pair_count(frames) * width, dtype=np.float32)
         self.rows = np.zeros((frames, rows, width), dtype=np.float32)
         self._windowed = np.zeros(rows * width, dtype=np.float32)
         self._packed = np.zeros(rows * width, dtype=np.float32)
-        self._spectra = np.zeros((2, frames, rows * width // 2), dtype=np.float32)
+        self._spectra = np.zeros((2, frames * rows * width // 2), dtype=np.float32)
         self._shape = (rows, width)
         self._tukey: dict[int, Plane] = {}
 
@@ -136,21 +137,19 @@ class _Buffers:
         span = int(offset.max()) - first
         band = Band(fast_length(width - span))
         spare = (width - span - band.length) // 2
-        re, im = self._spectra[:, :, : rows * band.count].reshape(2, -1, rows, band.count)
+        re, im = (flat[: frames * rows * band.count].reshape(frames, rows, -1) for flat in self._spectra)
         groups = len(layout.edges) - 1
         total = np.zeros((groups, band.count), dtype=np.float32)
-        part = np.empty((2, groups, band.count), dtype=np.float32)
+        part = np.empty((groups, band.count), dtype=np.float32)
         for k, plane in enumerate(planes):
             self.spectra(plane, int(offset[k]) - first + spare, self._window(band.length), band, re[k], im[k])
-            power(re[k], im[k], layout.edges, part[0])
-            total += part[0]
-        out = np.empty((2, STRIPS, layout.classes, pair_count(frames), band.count), dtype=np.float32)
-        p = 0
-        for i in range(frames):
-            for j in range(i + 1, frames):
-                pair_products(re[i], im[i], re[j], im[j], layout.edges, part[0], part[1])
-                out[:, :, :, p] = part.reshape(2, STRIPS, layout.classes, -1)
-                p += 1
+            power(re[k], im[k], layout.edges, part)
+            total += part
+        pairs = pair_count(frames)
+        shape = (2, STRIPS, layout.classes, pairs, band.count)
+        out = self._pairs[: 2 * groups * pairs * band.count].reshape(shape)
+        flat = out.reshape(2, groups, pairs, band.count)
+        all_pair_products(re, im, layout.edges, flat[0], flat[1])
         power_sum = total.reshape(STRIPS, layout.classes, -1)
         return Products(out[0], out[1], power_sum, offset.astype(np.float64), band, layout.count.astype(np.float64))
 

@@ -153,8 +153,8 @@ def test_coherent_power_and_the_search_agree_with_brute_force() -> None:
     found = profiles(lag_sums(p_re, p_im, FRAMES), band, grid, np.ones(1))
     brute = [_likelihood(re, im, omega, weight, d * np.arange(FRAMES)) for d in grid]
     np.testing.assert_allclose(found.gain[0], brute, rtol=1e-3, atol=1e-3 * np.abs(brute).max())
-    out = np.empty(band.count)
-    coherent_power(p_re[0], p_im[0], omega, 1.5 * np.arange(FRAMES), out)
+    out = np.empty((1, band.count))
+    coherent_power(p_re, p_im, omega, 1.5 * np.arange(FRAMES), out)
     assert 2.0 * out.sum() == pytest.approx(_likelihood(re, im, omega, weight, 1.5 * np.arange(FRAMES)), rel=1e-3)
 
 
