@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from axialnav.fusion.batch import run_batch
 from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.config import Config, Gate, UwbTuning
 from axialnav.fusion.kernels.update import redescend, repetition
+from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import build_sources
 from axialnav.models.rig import Imu, Uwb
+from tests.fusion.made_flights import Scene, fly
 
 
 @pytest.mark.parametrize("dof", [1, 2, 3])
@@ -51,11 +54,18 @@ def test_the_weight_only_ever_falls_and_takes_the_influence_down_with_it() -> No
 
 
 def test_readings_that_repeat_each_other_count_as_fewer() -> None:
-    """Variance of the mean of n readings with correlation exp(-dt / tau), n large: 1 + 2 tau / dt times white."""
+    """Variance of the mean of many readings whose errors are correlated by exp(-dt / tau), against white ones."""
     assert repetition(0.1, 0.0) == 1.0
-    assert repetition(0.002, 0.012) == pytest.approx(13.0)
-    assert repetition(float("nan"), 0.012) == 1.0
-    tau, dt, n = 0.2, 0.02, 20000
+    assert repetition(0.0, 0.012) == 1.0
+    n = 20000
     lags = np.arange(1, n)
-    variance = 1.0 + 2.0 * ((1 - lags / n) * np.exp(-lags * dt / tau)).sum()
-    assert repetition(dt, tau) == pytest.approx(variance, rel=0.06)
+    for tau, dt in ((0.2, 0.02), (0.012, 0.0025), (0.012, 0.1)):
+        variance = 1.0 + 2.0 * ((1 - lags / n) * np.exp(-lags * dt / tau)).sum()
+        assert repetition(dt, tau) == pytest.approx(variance, rel=2e-3)
+
+
+def test_the_first_reading_of_a_source_stands_for_itself() -> None:
+    """How often it speaks is not known yet; that must not blind it."""
+    assert repetition(float("nan"), 0.0) == 1.0
+    flight = fly(Scene(seed=1, duration_s=2.0, sensors=("uwb0",)))
+    assert run_batch(flight.config, flight.tables).log.reason[0] in (Reason.NONE, Reason.INNOVATION)
