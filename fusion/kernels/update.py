@@ -43,7 +43,7 @@ def repetition(gap_s: float, correlation_s: float) -> float:
     Errors with the correlation exp(-dt / tau) average as slowly as white ones of a variance coth(dt / 2 tau) times
     larger: 1 for slow sources, 2 tau / dt for fast ones.
     """
-    if gap_s <= 0.0 or correlation_s <= 0.0:
+    if not (gap_s > 0.0 and correlation_s > 0.0):  # also before the second reading, when the gap is not known
         return 1.0
     return 1.0 / math.tanh(0.5 * gap_s / correlation_s)
 
