@@ -66,6 +66,6 @@ def test_readings_that_repeat_each_other_count_as_fewer() -> None:
 
 def test_the_first_reading_of_a_source_stands_for_itself() -> None:
     """How often it speaks is not known yet; that must not blind it."""
-    assert repetition(float("nan"), 0.0) == 1.0
+    assert repetition(float("nan"), 0.012) == 1.0
     flight = fly(Scene(seed=1, duration_s=2.0, sensors=("uwb0",)))
     assert run_batch(flight.config, flight.tables).log.reason[0] in (Reason.NONE, Reason.INNOVATION)
