@@ -17,6 +17,7 @@ from axialnav.models.state import E_VEL, N_ERROR, POS, QUAT, VEL
 
 Array = NDArray[np.float64]
 MIN_WEIGHT = 1e-3
+REFUSED_COUNTS = 2.0  # a refused reading asks for a correction as if it lay this many times its gate away
 NOT_FINITE = int(Reason.NOT_FINITE)
 
 
@@ -79,7 +80,18 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
         if row == 0:
             for k in range(3):
                 m.correction[k] += w.step[E_VEL + k]
+    elif row == 0:
+        _note_refused(axes, repeated, REFUSED_COUNTS * math.sqrt(gate / nis), P, m, w)
     return float(-0.5 * (min(nis, gate) + log_det) / repeated)
+
+
+@kernel
+def _note_refused(axes: int, repeated: float, cap: float, P: Array, m: Record, w: Record) -> None:
+    """Add the correction of velocity that a refused reading asks for, as if it lay a little outside its gate."""
+    for i in range(axes):
+        S = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
+        for k in range(3):
+            m.correction[k] += w.PHt[E_VEL + k] / S * cap * (w.z[i] - w.h[i])
 
 
 @kernel
