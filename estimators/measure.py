@@ -44,6 +44,7 @@ TINY = 1e-12
 ENOUGH_BANDS = 3
 MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
+MAX_RIVAL_SHARE = 0.75
 MAX_SIGMA_PX = 0.3
 PRIOR_SIGMAS = 5.0
 PRIOR_MARGIN_PX = 1.0
@@ -211,6 +212,8 @@ def doubt_search(found: Profiles, choice: Choice, options: JointOptions) -> str:
         return MotionReason.AMBIGUOUS
     if found.outside_mass(choice.index, choice.agree) > MAX_OUTSIDE_MASS:
         return MotionReason.AMBIGUOUS
+    if found.rival_share(choice.index, choice.agree) > MAX_RIVAL_SHARE:
+        return MotionReason.PERIODIC
     if options.prior_px is not None and choice.index in (0, len(found.grid_px) - 1):
         return MotionReason.PRIOR_BORDER
     return ""

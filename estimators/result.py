@@ -16,6 +16,7 @@ class MotionReason(StrEnum):
     DARK = "the frames are black: open the shutter longer or light the wall"
     DUPLICATED = "two frames are identical: the camera or its driver delivered one twice"
     AMBIGUOUS = "no displacement stands out from the noise"
+    PERIODIC = "the wall repeats itself, several displacements fit alike: pass a prior that tells them apart"
     PRIOR_BORDER = "the best displacement lies at the border of the range that the prior allows"
     BANDS = "the row bands disagree: something that does not move with the wall fills too much of the picture"
     STATIC = "only a pattern fixed to the camera repeats from frame to frame"

@@ -16,6 +16,7 @@ Plane = NDArray[np.float32]
 STEP_PX = 0.25
 SOFTENING = 3.0  # windows and texture that is not Gaussian make the likelihood over-confident by about this factor
 NEAR_PX = 1.0
+RIVAL_PX = 8.0
 HANN_VARIANCE = 1.94  # of a sum over neighbouring bins, which a Hann window makes dependent
 
 
@@ -51,6 +52,14 @@ class Profiles:
         mass = np.exp(np.minimum(total - total[index], 50.0))
         near = np.abs(self.grid_px - self.grid_px[index]) <= NEAR_PX
         return float(mass[~near].sum() / mass.sum())
+
+    def rival_share(self, index: int, bands: NDArray[np.bool_]) -> float:
+        """Highest total elsewhere (further than 8 px) over the total at a grid point [-]."""
+        total = self.total(bands)
+        far = np.abs(self.grid_px - self.grid_px[index]) > RIVAL_PX
+        if not far.any() or total[index] <= 0.0:
+            return 0.0
+        return float(total[far].max() / total[index])
 
 
 def lag_sums(re: Plane, im: Plane, frames: int) -> NDArray[np.complex64]:

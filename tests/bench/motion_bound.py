@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.replay.simulate.render import LightLevel, Scene, Trajectory, render_frames
+from axialnav.replay.simulate.render import CameraModel, LightLevel, Scene, render_frames
 from tests.bench.motion_scenes import wall
 
 Array = NDArray[np.float64]
@@ -23,20 +23,13 @@ def wall_spectrum(number: int, width: int, height: int) -> Array:
 
     From an almost noise-free picture, windowed, with neighbouring bins averaged.
     """
-    scene = Scene(wall(number), PROBE_CONTRAST, PROBE, trajectory=Trajectory())
-    scene = Scene(scene.wall, PROBE_CONTRAST, PROBE, _sized(scene, width, height), Trajectory())
+    scene = Scene(wall(number), PROBE_CONTRAST, PROBE, CameraModel(width=width, height=height))
     picture = render_frames(scene, 1, np.random.default_rng(number)).frames[0].astype(np.float64)
     window = np.outer(np.hanning(height), np.hanning(width))
     power = np.abs(np.fft.fft2((picture - picture.mean()) * window)) ** 2 / np.sum(window**2)
     smooth = cv2.blur(np.fft.fftshift(power), (7, 7))
     density = np.maximum(np.fft.ifftshift(smooth) - QUANTISATION, 0.0)
     return np.asarray(density / (PROBE_CONTRAST * PROBE.mean_dn) ** 2)
-
-
-def _sized(scene: Scene, width: int, height: int):  # type: ignore[no-untyped-def]
-    from dataclasses import replace
-
-    return replace(scene.camera, width=width, height=height)
 
 
 def displacement_bound(scene: Scene, number: int, frames: int) -> float:

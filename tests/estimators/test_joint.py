@@ -139,3 +139,18 @@ def test_deep_pixels_and_colour_say_the_same() -> None:
     yuyv = estimate_motion([np.dstack([f, np.full_like(f, 128)]) for f in frames], frame_period_s=PERIOD_S)
     assert deep.displacement_px == pytest.approx(grey.displacement_px, abs=1e-4)
     assert colour.displacement_px == grey.displacement_px == yuyv.displacement_px
+
+
+def test_a_wall_that_repeats_itself_needs_a_prior() -> None:
+    """A strictly periodic wall fits at d and at d minus its period alike: refused, unless a prior rules one out."""
+    period, d = 64.0, 40.0
+    x = np.arange(640.0)
+    rng = np.random.default_rng(15)
+    level = np.linspace(0.7, 1.3, 360)[:, None]
+
+    def frame(k: int) -> np.ndarray:
+        waves = sum(np.sin(2.0 * np.pi * n * (x - d * k) / period + n) / n for n in range(1, 12))
+        return np.clip(110.0 + 15.0 * level * waves + rng.normal(0.0, 2.0, (360, 640)), 0, 255).astype(np.uint8)
+
+    frames = [frame(k) for k in range(5)]
+    assert not estimate_motion(frames, frame_period_s=PERIOD_S).accepted
