@@ -40,6 +40,8 @@ class RowLayout:
         Output row of coefficient j of block b, shape (blocks * 2^levels,).
     edges
         First output row of every class of every strip, and the end, shape (strips * classes + 1,).
+    height
+        Middle of every strip, -1 at the top and 1 at the bottom of all rows, shape (strips,).
     count
         Coefficient rows per strip and class, shape (strips, classes).
     """
@@ -53,6 +55,7 @@ class RowLayout:
         blocks = rows // size
         self.used = blocks * size
         starts = np.linspace(0, blocks, STRIPS + 1).astype(np.int64)
+        self.height = (starts[:-1] + starts[1:]) * size / rows - 1.0
         per_class = np.array([1, *(1 << level for level in range(self.levels))], dtype=np.int64)
         self.count = np.diff(starts)[:, None] * per_class[None]
         self.edges = np.concatenate([[0], np.cumsum(self.count)]).astype(np.int64)

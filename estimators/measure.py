@@ -34,6 +34,7 @@ from axialnav.estimators.kappa import blur_ratio
 from axialnav.estimators.layout import STRIPS
 from axialnav.estimators.products import Products
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
+from axialnav.estimators.roll import roll_step, unrolled
 from axialnav.estimators.search import STEP_PX, Profiles, lag_sums, profiles, unrelated_spread
 from axialnav.estimators.texture import matched_weight, shape_family, texture_power
 from axialnav.estimators.window import FrameWindow
@@ -44,6 +45,7 @@ TINY = 1e-12
 ENOUGH_BANDS = 3
 MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
+MAX_ROLL_STEPS = 4
 MAX_RIVAL_SHARE = 0.75
 MAX_SIGMA_PX = 0.3
 PRIOR_SIGMAS = 5.0
@@ -162,7 +164,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
 
 def fit_strips(products: Products, start_px: float, options: JointOptions) -> tuple[Fit | None, int]:
     """Fit, leave out strips that are disturbed or quarrel with the others, fit again; also how many were left out."""
-    fit = fit_frames(products, start_px, options)
+    products, fit = _level(products, fit_frames(products, start_px, options), options)
     lost = 0
     for doubt in (disturbed, quarrelling):
         if fit is None or not options.consensus:
@@ -175,6 +177,17 @@ def fit_strips(products: Products, start_px: float, options: JointOptions) -> tu
             products = products.selected(~bad)
             fit = fit_frames(products, float(fit.motion[0]), options)
     return fit, lost
+
+
+def _level(products: Products, fit: Fit | None, options: JointOptions) -> tuple[Products, Fit | None]:
+    """Take out the camera's roll as long as it shows."""
+    for _ in range(MAX_ROLL_STEPS):
+        shift = roll_step(fit, products.height) if fit is not None else None
+        if fit is None or shift is None:
+            break
+        products = unrolled(products, shift)
+        fit = fit_frames(products, float(fit.motion[0]), options)
+    return products, fit
 
 
 def fit_frames(products: Products, start_px: float, options: JointOptions) -> Fit | None:

@@ -31,6 +31,8 @@ class Products:
         Frequencies in use.
     rows
         Number of rows behind every sum, shape (s, c).
+    height
+        Place of every strip, -1 at the top of the picture, 1 at the bottom, shape (s,).
     """
 
     re: Plane
@@ -39,6 +41,7 @@ class Products:
     offset_px: Array
     band: Band
     rows: Array
+    height: Array
 
     @property
     def frames(self) -> int:
@@ -49,7 +52,14 @@ class Products:
         """The same with some strips only."""
         if strips.all():
             return self
-        return replace(self, re=self.re[strips], im=self.im[strips], power=self.power[strips], rows=self.rows[strips])
+        return replace(
+            self,
+            re=self.re[strips],
+            im=self.im[strips],
+            power=self.power[strips],
+            rows=self.rows[strips],
+            height=self.height[strips],
+        )
 
     def weighted(self, weight: Array) -> tuple[Plane, Plane]:
         """Sum over the classes with weights (c, f): two planes of shape (s, p, f)."""

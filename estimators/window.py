@@ -93,7 +93,9 @@ class FrameWindow:
             re[:, :, p] = self._pair_re[a, b].reshape(*shape, count)
             im[:, :, p] = self._pair_im[a, b].reshape(*shape, count)
         total = self._power[self.order].sum(axis=0).reshape(*shape, count)
-        return Products(re, im, total, np.zeros(frames), self.band, self.layout.count.astype(np.float64))
+        return Products(
+            re, im, total, np.zeros(frames), self.band, self.layout.count.astype(np.float64), self.layout.height
+        )
 
     def following(self, displacement_px: float, drift_px: float = 0.0) -> Products:
         """Products of windows that follow a wall moving by so much per frame along and across the rows."""
@@ -151,7 +153,9 @@ class _Buffers:
         flat = out.reshape(2, groups, pairs, band.count)
         all_pair_products(re, im, layout.edges, flat[0], flat[1])
         power_sum = total.reshape(STRIPS, layout.classes, -1)
-        return Products(out[0], out[1], power_sum, offset.astype(np.float64), band, layout.count.astype(np.float64))
+        return Products(
+            out[0], out[1], power_sum, offset.astype(np.float64), band, layout.count.astype(np.float64), layout.height
+        )
 
     def _window(self, length: int) -> Plane:
         if length not in self._tukey:

@@ -1,0 +1,78 @@
+r"""Roll of the camera from frame to frame: it moves the upper strips one way and the lower ones the other.
+
+A small roll :math:`\phi_k` of frame k about the optical axis adds :math:`y_s \phi_k` to the position of a strip at the
+height :math:`y_s`.  It is found from the strips' scores, and taken out of the products by a turn of their phases.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
+from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.products import Products
+from axialnav.models.jit import kernel
+
+Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
+CHI2_OFFSET, CHI2_PER_DOF = 16.0, 3.5
+MAX_STEP_PX = 0.6
+
+
+def roll_step(fit: Fit, height: Array) -> Array | None:
+    """Gauss-Newton step of the shift that roll gives a strip at height 1, per frame [px]; None if not significant.
+
+    ``height`` (s,) is the place of every strip, from -1 at the top to 1 at the bottom.
+    """
+    frames = fit.score.shape[1]
+    known = motion_basis(frames, len(fit.motion) == 2)
+    free = np.linalg.svd(np.ones((1, frames)))[2][1:].T
+    crossed = np.einsum("s,sij->ij", height, fit.information)
+    squared = np.einsum("s,sij->ij", height**2, fit.information)
+    J = np.block(
+        [
+            [known.T @ fit.information.sum(axis=0) @ known, known.T @ crossed @ free],
+            [free.T @ crossed @ known, free.T @ squared @ free],
+        ]
+    )
+    if float(np.linalg.eigvalsh(J)[0]) <= 0.0:
+        return None
+    g = np.concatenate([known.T @ fit.score.sum(axis=0), free.T @ (height @ fit.score)])
+    covariance = np.linalg.inv(J)
+    many = known.shape[1]
+    step = (covariance @ g)[many:]
+    chi2 = float(step @ np.linalg.solve(covariance[many:, many:], step)) / WINDOW_VARIANCE
+    if chi2 < CHI2_OFFSET + CHI2_PER_DOF * (frames - 1):
+        return None
+    shift = free @ step
+    return np.asarray(shift * min(1.0, MAX_STEP_PX / float(np.abs(shift).max())))
+
+
+def unrolled(products: Products, shift_px: Array) -> Products:
+    """The products as if frame k had not been rolled by ``shift_px[k]`` at height 1."""
+    re, im = products.re.copy(), products.im.copy()
+    _turn(re, im, 2.0 * np.pi * products.band.frequency(), products.height, shift_px)
+    return replace(products, re=re, im=im)
+
+
+@kernel
+def _turn(re: Plane, im: Plane, omega: Array, height: Array, shift: Array) -> None:
+    """Multiply products (s, c, p, f) by ``exp(i w y_s (x_i - x_j))``."""
+    strips, classes, _, count = re.shape
+    frames = shift.shape[0]
+    for s in range(strips):
+        p = 0
+        for i in range(frames):
+            for j in range(i + 1, frames):
+                for f in range(count):
+                    angle = omega[f] * height[s] * (shift[i] - shift[j])
+                    c = np.float32(np.cos(angle))
+                    d = np.float32(np.sin(angle))
+                    for k in range(classes):
+                        a, b = re[s, k, p, f], im[s, k, p, f]
+                        re[s, k, p, f] = a * c - b * d
+                        im[s, k, p, f] = a * d + b * c
+                p += 1
