@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -63,6 +63,12 @@ def motion_command(
         return _experiment(experiment, out or Path("runs") / experiment, seed, trials)
     if flight is None:
         raise ConfigError("motion needs a flight folder, or --experiment NAME")
+    return _measure(
+        flight, out, method=method, frames=frames, camera=camera, axis=axis, distance_m=distance_m, undistort=undistort
+    )
+
+
+def _measure(flight: Path, out: Path | None, **options: Any) -> int:
     from axialnav.estimators.estimate import FrameError
     from axialnav.replay.flight import load_flight
     from axialnav.replay.motion import run_motion
@@ -71,10 +77,7 @@ def motion_command(
     recording = load_flight(flight)
     try:
         with progress_bar(f"motion {recording.name}") as progress:
-            run = run_motion(
-                recording, camera=camera, method=method, frames=frames, axis=axis, distance_m=distance_m,
-                undistort=undistort, progress=progress,
-            )  # fmt: skip
+            run = run_motion(recording, progress=progress, **options)
     except FrameError as error:
         raise _sorted_error(error) from error
     if out is not None:
