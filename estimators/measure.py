@@ -32,6 +32,7 @@ from axialnav.estimators.integrity import (
 from axialnav.estimators.joint import Fit, best_bend, fit_motion
 from axialnav.estimators.kappa import blur_ratio
 from axialnav.estimators.layout import STRIPS
+from axialnav.estimators.pattern import SURE, pattern_power, without_pattern
 from axialnav.estimators.products import Products
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.roll import roll_step, unrolled
@@ -165,6 +166,11 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
 def fit_strips(products: Products, start_px: float, options: JointOptions) -> tuple[Fit | None, int]:
     """Fit, leave out strips that are disturbed or quarrel with the others, fit again; also how many were left out."""
     products, fit = _level(products, fit_frames(products, start_px, options), options)
+    if fit is not None:
+        power, sigma = pattern_power(products, fit)
+        if power > SURE * sigma:
+            products = without_pattern(products, power)
+            fit = fit_frames(products, float(fit.motion[0]), options)
     lost = 0
     for doubt in (disturbed, quarrelling):
         if fit is None or not options.consensus:
