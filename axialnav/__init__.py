@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from axialnav.estimators.estimate import MotionEstimate as MotionEstimate
     from axialnav.estimators.estimate import MotionEstimator as MotionEstimator
     from axialnav.estimators.estimate import estimate_motion as estimate_motion
+    from axialnav.fusion.axial_estimator import AxialEstimator as AxialEstimator
     from axialnav.fusion.config import Config as Config
     from axialnav.fusion.corridor import CorridorEstimator as CorridorEstimator
     from axialnav.fusion.errors import AxialnavError as AxialnavError
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "axialnav.estimators.estimate": ("MotionEstimate", "MotionEstimator", "estimate_motion"),
+    "axialnav.fusion.axial_estimator": ("AxialEstimator",),
     "axialnav.fusion.config": ("Config",),
     "axialnav.fusion.corridor": ("CorridorEstimator",),
     "axialnav.fusion.errors": ("AxialnavError", "ConfigError", "FlightError", "ReadingError"),

@@ -62,7 +62,7 @@ def align(config: Config, src: Records, events: Events, memory: Memory) -> None:
     source = int(events.source[is_imu][0])
     samples = events.values[is_imu & window]
     level = level_from_gravity(config, events.t_ns[is_imu & window], samples, src["R_BS"][source])
-    initial = config.initial or _initial_from_uwb(config, src, events, window, level)
+    initial = config.initial or initial_from_uwb(config, src, events, window, level)
     x = np.zeros(N_NOMINAL)
     x[POS : POS + 3] = initial.position_m
     x[VEL : VEL + 3] = initial.velocity_m_s
@@ -124,7 +124,7 @@ def _first_variances(config: Config, initial: Initial, level: Level) -> Array:
     return variances
 
 
-def _initial_from_uwb(config: Config, src: Records, events: Events, window: NDArray[np.bool_], level: Level) -> Initial:
+def initial_from_uwb(config: Config, src: Records, events: Events, window: NDArray[np.bool_], level: Level) -> Initial:
     """First state of a flight that names none: where UWB says, or the origin; standing still; yaw 0."""
     start = config.start
     position, absolute = np.zeros(3), False

@@ -187,7 +187,9 @@ class AxialTuning(_Table, frozen=True, kw_only=True):
     attitude is taken to look where ``[initial]`` says.  The error of the axial acceleration is the tilt's error
     ``sigma_tilt_rad`` times gravity, alike over ``tilt_time_s``; on top comes white noise of ``accel_noise``
     (accelerometer) or ``thrust_noise`` (tilt alone: drag and climbing are not seen) [m s^-2 Hz^-1/2].  Across the
-    corridor the vehicle is expected to move with ``lateral_speed_m_s``, in stretches of ``lateral_time_s``.
+    corridor the vehicle is expected to move with ``lateral_speed_m_s``, in stretches of ``lateral_time_s``.  An
+    accelerometer that differs from the tilt by more than ``doubt_m_s2``, as a mean over two seconds, is flagged and
+    not used.
     """
 
     heading_rad: float | None = None
@@ -198,6 +200,7 @@ class AxialTuning(_Table, frozen=True, kw_only=True):
     thrust_noise: Positive = 0.5
     lateral_speed_m_s: Positive = 0.5
     lateral_time_s: Positive = 1.0
+    doubt_m_s2: Positive = 1.5
 
 
 class DelayTuning(_Table, frozen=True, kw_only=True):

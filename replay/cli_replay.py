@@ -44,7 +44,7 @@ def replay(
     without
         Sensors to switch off, separated by commas.
     estimator
-        Which filter: corridor.
+        Which filter: corridor, or axial for flights that carry the autopilot's attitude.
     smooth
         Go back over the flight after filtering, so that every estimate knows the readings that came later.
     param

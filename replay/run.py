@@ -11,12 +11,12 @@ from typing import Any
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.outcome import InnovationLog, Track
-from axialnav.models.rig import Imu
+from axialnav.models.rig import AttitudeSource, Imu
 from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.frames import with_pixel_motion
 from axialnav.replay.fused import Column, digest, fused_columns
 
-ESTIMATORS = ("corridor",)
+ESTIMATORS = ("corridor", "axial")
 MIN_IMU_SAMPLES = 2
 
 
@@ -80,28 +80,28 @@ def replay(
     without
         Names of sensors to switch off.
     estimator
-        ``"corridor"``: the 18-state filter.
+        ``"corridor"``: the 18-state filter.  ``"axial"``: four states, for flights with the autopilot's attitude.
     params
         Single settings by dotted name, values as TOML text: ``{"uwb.sigma_m": "0.4"}``.
     smooth
-        Go back over the flight afterwards, so that every estimate knows the readings that came later.
+        Go back over the flight afterwards, so that every estimate knows the readings that came later; corridor only.
     progress
         Called with the share done, 0 .. 1.
 
     Raises
     ------
     ConfigError
-        Unknown setting, sensor or estimator.
+        Unknown setting, sensor or estimator, or an estimator that cannot smooth.
     FlightError
-        The flight cannot be replayed: unreadable, or without IMU samples.
+        The flight cannot be replayed: unreadable, or without IMU samples (for "axial": without attitudes).
     """
     from axialnav.replay.metrics import score
 
-    _refuse_unknown(estimator)
+    _refuse_unknown(estimator, smooth)
     loaded = flight if isinstance(flight, Flight) else load_flight(flight)
     started = time.perf_counter()
     resolved = resolve(config, loaded, without=without, params=params)
-    track, log, kernel_s = _filter(loaded, resolved, smooth, progress)
+    track, log, kernel_s = _filter(loaded, resolved, estimator, smooth, progress)
     columns = fused_columns(track, resolved.corridor)
     scores = score(track, log, loaded, resolved)
     head = {"flight": loaded.name, "estimator": estimator, "smoothed": smooth, "digest": digest(columns)}
@@ -119,28 +119,40 @@ def resolve(
     return resolved.without(tuple(without)) if without else resolved
 
 
-def _refuse_unknown(estimator: str) -> None:
+def _refuse_unknown(estimator: str, smooth: bool) -> None:
     if estimator not in ESTIMATORS:
-        raise ConfigError(f"no estimator named {estimator!r}; there is {', '.join(ESTIMATORS)}")
+        raise ConfigError(f"no estimator named {estimator!r}; there are {', '.join(ESTIMATORS)}")
+    if smooth and estimator != "corridor":
+        raise ConfigError(f"estimator {estimator!r} cannot smooth; leave out smooth or choose 'corridor'")
 
 
 def _filter(
-    flight: Flight, config: Config, smooth: bool, progress: Callable[[float], None] | None
+    flight: Flight, config: Config, estimator: str, smooth: bool, progress: Callable[[float], None] | None
 ) -> tuple[Track, InnovationLog, float]:
+    from axialnav.fusion.axial_estimator import run_axial
     from axialnav.fusion.batch import run_batch
     from axialnav.fusion.smoother import run_smoothed
 
+    _require_samples(flight, config, estimator)
+    tables = with_pixel_motion(flight, config, flight.tables_for(config))
+    run = run_axial if estimator == "axial" else run_smoothed if smooth else run_batch
+    result = run(config, tables, progress)
+    return result.track, result.log, result.kernel_s
+
+
+def _require_samples(flight: Flight, config: Config, estimator: str) -> None:
+    """The axial estimator is driven by attitudes where there is no inertial unit."""
     inertial = [name for name, spec in config.sensor.items() if isinstance(spec, Imu)]
+    if estimator == "axial" and not inertial:
+        inertial = [name for name, spec in config.sensor.items() if isinstance(spec, AttitudeSource)]
     samples = max((len(flight.tables.get(name, ())) for name in inertial), default=0)
     if samples < MIN_IMU_SAMPLES:
         there = ", ".join(flight.tables) or "nothing"
+        needed = "att0" if estimator == "axial" else "imu0"
         raise FlightError(
             f"flight {flight.name}: {samples} IMU samples, at least {MIN_IMU_SAMPLES} are needed to replay; "
-            f"it holds {there}, the filter needs imu0"
+            f"it holds {there}, the filter needs {needed}"
         )
-    tables = with_pixel_motion(flight, config, flight.tables_for(config))
-    result = (run_smoothed if smooth else run_batch)(config, tables, progress)
-    return result.track, result.log, result.kernel_s
 
 
 def _timing(track: Track, kernel_s: float, wall_s: float) -> dict[str, float]:

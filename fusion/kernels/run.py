@@ -82,7 +82,7 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
     """One reading: bookkeeping, both filters, recovery."""
     kind = s.kind
     gap_s = (t_ns - seen.t_seen) * 1e-9
-    _note_arrival(t_ns, gap_s, kind, values, seen, m)
+    note_arrival(t_ns, gap_s, kind, values, seen, m)
     # the rival first, so that the record and the scratch left behind are the estimate's
     evidence, both_used = 0.0, m.on_trial == 1
     for row in range(m.on_trial, -1, -1):
@@ -109,7 +109,7 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
 
 
 @kernel
-def _note_arrival(t_ns: int, gap_s: float, kind: int, values: Array, seen: Record, m: Record) -> None:
+def note_arrival(t_ns: int, gap_s: float, kind: int, values: Array, seen: Record, m: Record) -> None:
     """Learn how often the source speaks and, for heights, where its zero is."""
     if gap_s < 1.0:
         known = np.isfinite(seen.gap_s)

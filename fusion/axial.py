@@ -1,0 +1,303 @@
+r"""The axial estimator: four states along the corridor, for logs with the autopilot's attitude but without raw IMU.
+
+Axial position s, velocity v, acceleration bias b and blur scale k follow
+
+.. math::
+    \dot s = v, \qquad \dot v = a - b + w_a, \qquad \dot b = -b / \tau + w_b, \qquad \dot k = w_k
+
+on filterpy's ExtendedKalmanFilter.  The acceleration a along the axis comes from the accelerometer turned by the
+attitude, or, where there are no inertial samples, from the attitude alone: a vehicle that neither climbs nor sinks
+accelerates with :math:`g\,(n \cdot R e_z) / (e_z \cdot R e_z)` along the horizontal n.  b stands for gravity leaking
+in through a wrong tilt.  What is across the axis is held (:mod:`axialnav.fusion.axial_held`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.alignment import Level, initial_from_uwb
+from axialnav.fusion.axial_held import Held
+from axialnav.fusion.config import Config
+from axialnav.fusion.errors import ConfigError, FlightError
+from axialnav.fusion.events import Events
+from axialnav.fusion.kernels.measure import BLUR, FLOW, measure
+from axialnav.fusion.kernels.propagate import rotate_sample
+from axialnav.fusion.kernels.reanchor import observe_source, reanchor
+from axialnav.fusion.kernels.run import note_arrival
+from axialnav.fusion.kernels.update import MIN_WEIGHT, is_uwb, redescend, repetition
+from axialnav.fusion.memory import (
+    LOG_CODE,
+    LOG_GATE,
+    LOG_INNOVATION,
+    LOG_NIS,
+    LOG_VARIANCE,
+    LOG_WEIGHT,
+    Memory,
+    Records,
+    build_settings,
+    new_memory,
+    new_scratch,
+)
+from axialnav.fusion.outcome import Reason
+from axialnav.fusion.sources import Kind, build_sources
+from axialnav.models.imu import strapdown
+from axialnav.models.rig import AttitudeSource, Imu
+from axialnav.models.rotations import quaternion_from_euler, rotation_matrix
+from axialnav.models.state import ACCEL_BIAS, E_POS, GYRO_BIAS, POS, QUAT, VEL
+from axialnav.models.tangent import rotation_between
+
+Array = NDArray[np.float64]
+DOUBT_TIME_S = 2.0
+RELIEF = 0.5  # an accelerometer in doubt is believed again below this share of the limit
+MAX_TILT_COSINE = 0.2  # steeper than 78 degrees, tilt says nothing of the acceleration
+
+
+class AxialFilter:
+    """The filter itself, one event at a time, on the memory of the 18-state filter.
+
+    Parameters
+    ----------
+    config
+        As for the corridor estimator; at least one attitude source is needed, inertial units are optional.
+
+    Raises
+    ------
+    ConfigError
+        No attitude source, or several inertial units.
+    """
+
+    def __init__(self, config: Config) -> None:
+        from filterpy.kalman import ExtendedKalmanFilter  # brings scipy.stats: half a second that others can spare
+
+        self.config = config
+        self.sources = build_sources(config)
+        self.settings = axial_settings(config)
+        self.held = Held.from_config(config)
+        self.driver = _driver(config)
+        self._ekf: Any = ExtendedKalmanFilter(dim_x=4, dim_z=1)
+        self._scratch = new_scratch()
+        self._heading_rad = 0.0
+        self._row, self._F, self._R = np.empty(6), np.empty((9, 3)), np.empty((3, 3))
+
+    def span_s(self, events: Events) -> float | None:
+        """How long the samples that drive the filter last [s]; None where it cannot start yet: no attitude."""
+        kinds = self.sources["kind"][events.source]
+        drivers = events.t_ns[kinds == int(self.driver)]
+        if not len(drivers) or not (kinds == int(Kind.ATTITUDE)).any():
+            return None
+        return float(drivers[-1] - drivers[0]) * 1e-9
+
+    def start(self, events: Events) -> Memory:
+        """First state from the events of the first ``start.window_s``.
+
+        Raises
+        ------
+        FlightError
+            Nothing that drives the filter, or no attitude.
+        """
+        kinds = self.sources["kind"][events.source]
+        drivers, attitudes = kinds == int(self.driver), kinds == int(Kind.ATTITUDE)
+        if not (drivers.any() and attitudes.any()):
+            raise FlightError("the axial estimator needs the autopilot's attitude; there is no usable row of it")
+        t0 = int(events.t_ns[drivers][0])
+        window = events.t_ns <= t0 + round(self.config.start.window_s * 1e9)
+        roll, pitch, yaw = events.values[attitudes][0, :3]
+        level = Level(roll, -pitch, np.zeros(3), 0.0)
+        initial = self.config.initial or initial_from_uwb(self.config, self.sources, events, window, level)
+        given = self.config.axial.heading_rad
+        self._heading_rad = initial.yaw_rad + yaw if given is None else given
+        memory = new_memory(len(self.sources))
+        core = memory.core[0]
+        x = core["x"][0]
+        x[POS : POS + 3], x[VEL : VEL + 3] = initial.position_m, initial.velocity_m_s
+        x[QUAT : QUAT + 4] = self._attitude(roll, pitch, yaw)
+        tune, held = self.config, self.held
+        bias = (tune.gravity_m_s2 * tune.axial.sigma_tilt_rad) ** 2
+        axial = [initial.sigma_position_m**2, initial.sigma_velocity_m_s**2, bias, tune.flow.scale_sigma**2]
+        core["P"][0] = held.first(initial.sigma_position_m**2, tune.range.offset_sigma_m**2)
+        core["P"][0] += held.E @ np.diag(axial) @ held.E.T
+        core["t_aid"] = core["t_flow"] = t0
+        memory.sources["t_trusted"] = t0
+        return memory
+
+    def step(self, t_ns: int, source: int, values: Array, memory: Memory, log: Array) -> None:
+        """Process one event; ``log`` (10,) receives its record in the layout of :mod:`axialnav.fusion.memory`."""
+        core, kind = memory.core[0], int(self.sources["kind"][source])
+        log[:] = 0.0
+        if kind == int(self.driver) or (kind == int(Kind.ATTITUDE) and core["started"]):
+            self._drive(t_ns, source, values, core, kind == int(self.driver))
+            log[LOG_NIS], log[LOG_GATE], log[LOG_WEIGHT] = math.nan, math.nan, 1.0
+            memory.sources[source]["t_seen"] = memory.sources[source]["t_fused"] = t_ns
+        elif not core["started"]:
+            log[LOG_CODE] = -int(Reason.NOT_ALIGNED)
+        elif kind != int(Kind.IMU):
+            self._aid(t_ns, source, values, memory, log)
+
+    def coast(self, memory: Memory, ahead_s: float) -> None:
+        """Carry the state forward with the last sample."""
+        core = memory.core[0]
+        if self.driver is Kind.IMU:
+            self._inertial(core, core["imu"], ahead_s)
+        else:
+            self._predict(core, ahead_s, self._tilt_acceleration(core["x"][0]), self.config.axial.thrust_noise)
+
+    def _attitude(self, roll: float, pitch: float, yaw: float) -> Array:
+        """Body-to-world quaternion of the autopilot's angles (FRD to NED): pitch and yaw turn the other way in FLU."""
+        return quaternion_from_euler(roll, -pitch, self._heading_rad - yaw)
+
+    def _drive(self, t_ns: int, source: int, values: Array, core: Any, drives: bool) -> None:
+        """A sample that moves the filter on, or an attitude beside inertial samples."""
+        x, dt = core["x"][0], (t_ns - int(core["t_imu"])) * 1e-9
+        first = not core["started"]
+        if drives and (first or dt > 0.0):
+            core["started"], core["t_imu"] = 1, t_ns
+        if int(self.sources["kind"][source]) == int(Kind.IMU):
+            rotate_sample(values, self.sources["R_BS"][source], self._row)
+            mean = 0.5 * (core["imu"] + self._row)
+            if not first and dt > 0.0:
+                self._inertial(core, mean, dt)
+            if first or dt > 0.0:
+                core["imu"] = self._row
+            return
+        before = x[QUAT : QUAT + 4].copy()
+        x[QUAT : QUAT + 4] = self._attitude(values[0], values[1], values[2])
+        if drives and not first and dt > 0.0:
+            turn = np.empty(3)
+            rotation_between(before, x[QUAT : QUAT + 4], turn)
+            core["imu"][:3] = turn / dt
+            self._predict(core, dt, self._tilt_acceleration(x), self.config.axial.thrust_noise)
+
+    def _inertial(self, core: Any, sample: Array, dt: float) -> None:
+        """Predict with rate and specific force (6,) in body axes."""
+        x = core["x"][0]
+        moved = x.copy()
+        moved[VEL : VEL + 3] = moved[GYRO_BIAS : GYRO_BIAS + 3] = moved[ACCEL_BIAS : ACCEL_BIAS + 3] = 0.0
+        strapdown(moved, sample[:3], sample[3:], dt, self.config.gravity_m_s2, self._R, self._F)
+        x[QUAT : QUAT + 4] = moved[QUAT : QUAT + 4]
+        felt, seen = float(self.held.axis @ moved[VEL : VEL + 3]) / dt, self._tilt_acceleration(x)
+        if self._is_ill(core, felt - seen, dt):
+            self._predict(core, dt, seen, self.config.axial.thrust_noise)
+        else:
+            self._predict(core, dt, felt, self.config.axial.accel_noise)
+
+    def _is_ill(self, core: Any, difference: float, dt: float) -> bool:
+        """Whether the accelerometer contradicts the tilt for longer than drag or a climb could explain."""
+        fault = self.config.imu_fault
+        mean = core["correction_rate"]
+        mean[0] += min(dt / DOUBT_TIME_S, 1.0) * (difference - mean[0])
+        limit = self.config.axial.doubt_m_s2 * (RELIEF if core["imu_fault"] else 1.0)
+        core["imu_fault"] = int(fault.enabled and abs(float(mean[0])) > limit)
+        return bool(core["imu_fault"])
+
+    def _tilt_acceleration(self, x: Array) -> float:
+        up = rotation_matrix(x[QUAT : QUAT + 4])[:, 2]
+        return float(self.config.gravity_m_s2 * (self.held.axis[:2] @ up[:2]) / max(up[2], MAX_TILT_COSINE))
+
+    def _predict(self, core: Any, dt: float, accel_m_s2: float, noise: float) -> None:
+        """All states over ``dt``, the four of them by filterpy."""
+        x, tune, ekf = core["x"][0], self.config.axial, self._ekf
+        ekf.x = self.held.states(x)
+        ekf.P, S = self.held.split(core["P"][0])
+        keep = math.exp(-dt / tune.tilt_time_s)
+        ekf.F = np.array([[1, dt, -0.5 * dt * dt, 0], [0, 1, -dt, 0], [0, 0, keep, 0], [0, 0, 0, 1]])
+        ekf.B = np.array([0.5 * dt * dt, dt, 0.0, 0.0])
+        bias = (self.config.gravity_m_s2 * tune.sigma_tilt_rad) ** 2 * (1.0 - keep * keep)
+        q = noise * noise
+        ekf.Q = np.diag([q * dt**3 / 3, q * dt, bias, self.config.flow.scale_walk**2 * dt])
+        ekf.Q[0, 1] = ekf.Q[1, 0] = q * dt * dt / 2
+        ekf.predict(u=accel_m_s2)
+        S = self.held.drift(x, S, dt)
+        self._put(core, S)
+
+    def _put(self, core: Any, S: Array) -> None:
+        """Store filterpy's states beside the held covariance."""
+        self.held.put_states(core["x"][0], self._ekf.x)
+        core["P"][0] = S + self.held.E @ self._ekf.P @ self.held.E.T
+
+    def _aid(self, t_ns: int, source: int, values: Array, memory: Memory, log: Array) -> None:
+        """One reading: bookkeeping, gate, update, recovery; the same steps as in the 18-state filter."""
+        core, s, seen, kind = (
+            memory.core[0],
+            self.sources[source],
+            memory.sources[source],
+            int(self.sources["kind"][source]),
+        )
+        gap_s = (t_ns - int(seen["t_seen"])) * 1e-9
+        note_arrival(t_ns, gap_s, kind, values, seen, core)
+        w, x = self._scratch[0], core["x"][0]
+        w["p"] = x[POS : POS + 3] + (t_ns - int(core["t_imu"])) * 1e-9 * x[VEL : VEL + 3]
+        w["R"] = rotation_matrix(x[QUAT : QUAT + 4])
+        axes = measure(s, seen, values, x, core["P"][0], core, w, self.settings[0])
+        log[LOG_CODE] = axes
+        used = axes > 0 and self._fuse(axes, s, seen, core, w, log)
+        if used:
+            seen["t_fused"] = t_ns
+            if FLOW <= kind <= BLUR:
+                core["t_flow"] = core["t_aid"] = t_ns
+        if is_uwb(kind):
+            if used:
+                core["t_aid"] = t_ns
+            if log[LOG_CODE] > 0.0:
+                observe_source(t_ns, gap_s, axes, float(log[LOG_WEIGHT]), seen, w)
+            if not used:
+                self._recover(t_ns, seen, core, w)
+
+    def _fuse(self, axes: int, s: Any, seen: Any, core: Any, w: Any, log: Array) -> bool:
+        """Gate a reading and correct both parts of the state with it; whether it was used."""
+        x, P, H = core["x"][0], core["P"][0], w["H"][:axes].copy()
+        repeated = 1.0
+        if is_uwb(int(s["kind"])):
+            repeated = repetition(float(seen["gap_s"]), float(self.settings["uwb_correlation_s"][0]))
+        y, variance = (w["z"] - w["h"])[:axes], w["variance"][:axes] * repeated
+        S = H @ P @ H.T + np.diag(variance)
+        nis = float(y @ np.linalg.solve(S, y)) if np.isfinite(S).all() else math.nan
+        if not math.isfinite(nis):
+            log[LOG_CODE] = -int(Reason.NOT_FINITE)
+            return False
+        gate = float(s["gate"][axes - 1])
+        weight = redescend(nis / axes, float(s["soft_nis"])) if nis <= gate else 0.0
+        log[LOG_INNOVATION : LOG_INNOVATION + axes], log[LOG_VARIANCE : LOG_VARIANCE + axes] = y, np.diag(S)
+        log[LOG_NIS], log[LOG_GATE], log[LOG_WEIGHT] = nis, gate, weight
+        if weight <= MIN_WEIGHT:
+            return False
+        R, ekf = np.diag(variance / weight), self._ekf
+        ekf.x = self.held.states(x)
+        ekf.P, held = self.held.split(P)
+        H4 = H @ self.held.E
+        held_after = self.held.correct(x, held, H, y, R + H4 @ ekf.P @ H4.T)
+        z, h = w["z"][:axes].copy(), w["h"][:axes].copy()
+        ekf.update(z, lambda _: H4, lambda _: h, R=R + H @ held @ H.T)
+        self._put(core, held_after)
+        return True
+
+    def _recover(self, t_ns: int, seen: Any, core: Any, w: Any) -> None:
+        """Re-anchor the position where a UWB source was refused for too long; then part it again along and across."""
+        if not reanchor(t_ns, seen, core, w, self.settings[0]):
+            return
+        across, along, P = self.held.across, np.outer(self.held.axis, self.held.axis), core["P"][0]
+        block = P[E_POS : E_POS + 3, E_POS : E_POS + 3]
+        block[:] = along * (self.held.axis @ block @ self.held.axis) + across @ block @ across
+
+
+def axial_settings(config: Config) -> Records:
+    """Numbers for the shared kernels; where no inertial unit is mounted, those of a standard one (they go unused)."""
+    units = [n for n, spec in config.sensor.items() if isinstance(spec, Imu) and n not in config.disabled]
+    if units:
+        return build_settings(config)
+    return build_settings(msgspec.structs.replace(config, sensor={**config.sensor, "": Imu()}))
+
+
+def _driver(config: Config) -> Kind:
+    """What moves the filter on: inertial samples where they are, else attitudes."""
+    enabled = [spec for name, spec in config.sensor.items() if name not in config.disabled]
+    if not any(isinstance(spec, AttitudeSource) for spec in enabled):
+        raise ConfigError(
+            "the axial estimator needs the autopilot's attitude, got no such source; add [sensor.att0] or use the "
+            "corridor estimator, which needs inertial samples only"
+        )
+    return Kind.IMU if any(isinstance(spec, Imu) for spec in enabled) else Kind.ATTITUDE
