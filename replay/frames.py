@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from axialnav.fusion.config import Config
+from axialnav.fusion.errors import FlightError
 from axialnav.fusion.readings import CameraFrame
 from axialnav.models.rig import Camera
 from axialnav.replay.flight import Flight, SensorTable
@@ -24,12 +25,23 @@ def with_pixel_motion(flight: Flight, config: Config, tables: Mapping[str, Senso
 def motion_table(flight: Flight, camera: str, config: Config) -> SensorTable:
     """Pixel motion of every window of frames, stamped at its middle; NaN where the images gave nothing to believe.
 
+    Raises
+    ------
+    FlightError
+        A picture is missing or cannot be used, or there are too few.
+
+    Notes
+    -----
     The same estimates as :class:`~axialnav.fusion.camera_feed.CameraFeed` makes of the frames in flight.
     """
+    from axialnav.estimators.errors import FrameError
     from axialnav.replay.motion import run_motion
 
     frames = config.camera.frames
-    run = run_motion(flight, camera=camera, method=config.camera.method, frames=frames, undistort=True)
+    try:
+        run = run_motion(flight, camera=camera, method=config.camera.method, frames=frames, undistort=True)
+    except FrameError as error:
+        raise FlightError(f"flight {flight.name}, {camera}: {error}") from None
     estimates = [e for e in run.estimates if e.t_ns is not None]
     window = np.array([e.window_s / (frames - 1) for e in estimates])
     return SensorTable(

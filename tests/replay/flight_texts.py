@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 IMU_HEADER = (
@@ -20,6 +21,13 @@ TOF_YAML = "sensor_type: range_finder\nrange_min_m: 0.02\nrange_max_m: 4.0\nsurf
 def imu_lines(rows: int = IMU_ROWS, start_ns: int = 1_000_000_000) -> list[str]:
     """Rows of an IMU at 200 Hz that stands still; the third value numbers the row."""
     return [f"{start_ns + i * STEP_NS},0.0,0.0,{i / 1e4!r},0.0,0.0,9.81" for i in range(rows)]
+
+
+def picture(name: str) -> bytes:
+    """A small PNG whose grey value tells the pictures of a flight apart."""
+    done, png = cv2.imencode(".png", np.full((4, 6), len(name), np.uint8))
+    assert done
+    return png.tobytes()
 
 
 def write_sensor(flight: Path, name: str, lines: list[str], yaml: str | None = None, end: str = "\n") -> Path:
@@ -102,7 +110,7 @@ def full_flight(flight: Path, seed: int = 7) -> Path:
     images = write_sensor(flight, "cam0", ["#timestamp [ns],filename,exposure [s]", *frames], CAM_YAML).parent / "data"
     images.mkdir()
     for image in ("a b.png", "2.png"):
-        (images / image).write_bytes(b"image " + image.encode())
+        (images / image).write_bytes(picture(image))
     (flight / "flight.toml").write_text(FULL_TOML, encoding="utf-8")
     return flight
 

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from axialnav.fusion.errors import FlightError
+from axialnav.fusion.sources import fused_sensors
 from axialnav.replay.flight import load_flight
 from tests.replay.flight_texts import CAM_YAML, SENSORS, full_flight, standing_flight, write_sensor
 
@@ -44,7 +45,7 @@ def check(flight_folder: Path) -> None:
     for table in flight.tables.values():
         assert np.all(np.diff(table.t_ns) >= 0)
         assert all(len(column) == len(table) for column in table.columns.values())
-    fusable = sum(len(table) for name, table in flight.tables.items() if not name.startswith("cam"))
+    fusable = sum(len(flight.tables[name]) for name in fused_sensors(flight.config) if name in flight.tables)
     assert sum(1 for _ in flight.readings()) == fusable
     assert all(drop.count > 0 and drop.reason for drop in flight.drops)
 

@@ -18,7 +18,7 @@ from axialnav.models.rig import Flow, Imu, Uwb
 from axialnav.replay.flight import Flight, SensorTable, load_flight
 from axialnav.replay.flight_cut import cut_flight
 from axialnav.replay.flight_writer import write_flight
-from tests.replay.flight_texts import UWB_YAML, full_flight, standing_flight, write_sensor
+from tests.replay.flight_texts import UWB_YAML, full_flight, picture, standing_flight, write_sensor
 
 
 def assert_same_flight(one: Flight, other: Flight) -> None:
@@ -48,7 +48,7 @@ def test_every_kind_of_sensor_reads_back_equal(tmp_path: Path) -> None:
     copy = load_flight(write_flight(flight, tmp_path / "copy"))
     assert_same_flight(flight, copy)
     assert copy.drops == ()
-    assert copy.image_path("cam0", "a b.png").read_bytes() == b"image a b.png"
+    assert copy.image_path("cam0", "a b.png").read_bytes() == picture("a b.png")
 
 
 def test_a_written_copy_is_a_fixed_point(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_images_already_in_place_are_left_alone(tmp_path: Path) -> None:
     (images / "2.png").write_bytes(b"rendered")
     write_flight(flight, tmp_path / "second")
     assert (images / "2.png").read_bytes() == b"rendered"
-    assert (images / "a b.png").read_bytes() == b"image a b.png"
+    assert (images / "a b.png").read_bytes() == picture("a b.png")
 
 
 def test_an_anchor_that_a_csv_file_cannot_hold_is_refused(tmp_path: Path) -> None:
