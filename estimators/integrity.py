@@ -80,15 +80,15 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
 
 
 def quarrelling(fit: Fit, products: Products) -> Mask:
-    """Strips whose own displacement lies far from the common one, shape (s,).
+    """Strips whose own displacement lies far from that of the usual strip, shape (s,).
 
     Far is measured by their own information and by how much strips differ in general, so that a picture that is
     uneven everywhere loses none.
     """
     basis = motion_basis(fit.score.shape[1], len(fit.motion) == 2)[:, 0]
     own = np.einsum("i,sij,j->s", basis, fit.information, basis)
-    score = fit.score @ basis
-    deviation = np.abs(score) / np.sqrt(WINDOW_VARIANCE * np.maximum(own, TINY))
+    step = (fit.score @ basis) / np.maximum(own, TINY)
+    deviation = np.abs(step - np.median(step)) * np.sqrt(np.maximum(own, TINY) / WINDOW_VARIANCE)
     usual = max(1.0, float(np.median(deviation)) / MEDIAN_OF_NORMAL)
     return np.asarray((deviation > FAR * usual) | (own <= 0.0))
 

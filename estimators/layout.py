@@ -40,6 +40,8 @@ class RowLayout:
         Output row of coefficient j of block b, shape (blocks * 2^levels,).
     edges
         First output row of every class of every strip, and the end, shape (strips * classes + 1,).
+    strip_edges
+        First output row of every strip, and the end, shape (strips + 1,).
     height
         Middle of every strip, -1 at the top and 1 at the bottom of all rows, shape (strips,).
     count
@@ -59,6 +61,7 @@ class RowLayout:
         per_class = np.array([1, *(1 << level for level in range(self.levels))], dtype=np.int64)
         self.count = np.diff(starts)[:, None] * per_class[None]
         self.edges = np.concatenate([[0], np.cumsum(self.count)]).astype(np.int64)
+        self.strip_edges = self.edges[:: self.classes].copy()
         first = np.concatenate([[0], np.cumsum(per_class)])
         self.place = np.empty(self.used, dtype=np.int64)
         for strip in range(STRIPS):

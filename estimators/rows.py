@@ -102,6 +102,15 @@ def apply_window(rows: Plane, start: int, window: Plane, out: Plane) -> None:
             out[r, c] = rows[r, start + c] * window[c]
 
 
+@kernel
+def apply_strip_windows(rows: Plane, start: int, edges: NDArray[np.int64], windows: Plane, out: Plane) -> None:
+    """:func:`apply_window` with a window of its own for every strip: ``windows`` (s, length), ``edges`` (s + 1,)."""
+    for s in range(windows.shape[0]):
+        for r in range(edges[s], edges[s + 1]):
+            for c in range(windows.shape[1]):
+                out[r, c] = rows[r, start + c] * windows[s, c]
+
+
 def tukey(length: int, share: float = 0.12) -> Plane:
     """Window (length,) with cosine flanks over ``share`` of it."""
     flank = int(share * (length - 1) / 2)

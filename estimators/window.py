@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from axialnav.estimators.drift import DriftMeter
 from axialnav.estimators.frames import Image
 from axialnav.estimators.layout import STRIPS, RowLayout, haar_rows
+from axialnav.estimators.occlusion import LEAST_SHARE, OccluderFinder, wall_window
 from axialnav.estimators.products import Products
-from axialnav.estimators.rows import apply_window, bin_height, bin_rows, fast_length, hann, tukey
+from axialnav.estimators.rows import apply_strip_windows, apply_window, bin_height, bin_rows, fast_length, hann, tukey
 from axialnav.estimators.spectrum import Band, all_pair_products, pair_count, pair_products, power, row_spectra
 
 Plane = NDArray[np.float32]
@@ -48,6 +49,7 @@ class FrameWindow:
         self._power = np.zeros((frames, groups, count), dtype=np.float32)
         self._pair_re = np.zeros((frames, frames, groups, count), dtype=np.float32)
         self._pair_im = np.zeros_like(self._pair_re)
+        self._occluders = OccluderFinder(rows, width, self.layout.strip_edges)
         self.drift = DriftMeter(height, width, frames)
         self.order: list[int] = []
 
@@ -109,7 +111,8 @@ class FrameWindow:
                 plane = self._buffers.rows[slot]
                 self._transform(slot, int(shift), plane)
             planes.append(plane)
-        return self._buffers.products(planes, offset, self.layout)
+        hidden = self._occluders.hidden(planes, offset)
+        return self._buffers.products(planes, offset, self.layout, hidden)
 
 
 class _Buffers:
@@ -126,35 +129,45 @@ class _Buffers:
 
     def spectra(self, plane: Plane, start: int, window: Plane, band: Band, re: Plane, im: Plane) -> None:
         """Windowed row spectra of ``plane`` into ``re`` and ``im`` (r, f)."""
-        shape = (self._shape[0], band.length)
-        windowed = self._windowed[: shape[0] * shape[1]].reshape(shape)
-        packed = self._packed[: shape[0] * shape[1]].reshape(shape)
+        windowed, packed = self._planes(band.length)
         apply_window(plane, start, window, windowed)
         row_spectra(windowed, band, packed, re, im)
 
-    def products(self, planes: list[Plane], offset: NDArray[np.int64], layout: RowLayout) -> Products:
-        """Products of windows of ``planes`` that start at ``offset``."""
+    def _planes(self, length: int) -> tuple[Plane, Plane]:
+        shape = (self._shape[0], length)
+        size = shape[0] * length
+        return self._windowed[:size].reshape(shape), self._packed[:size].reshape(shape)
+
+    def products(
+        self, planes: list[Plane], offset: NDArray[np.int64], layout: RowLayout, hidden: NDArray[np.bool_]
+    ) -> Products:
+        """Products of windows of ``planes`` that start at ``offset`` and leave out ``hidden`` cells (s, b)."""
         rows, width = self._shape
-        frames, first = len(planes), int(offset.min())
-        span = int(offset.max()) - first
-        band = Band(fast_length(width - span))
-        spare = (width - span - band.length) // 2
+        frames = len(planes)
+        band = Band(fast_length(width - int(np.ptp(offset))))
+        starts = offset - offset.min() + (width - int(np.ptp(offset)) - band.length) // 2
+        windows, share = wall_window(hidden, starts, self._window(band.length))
         re, im = (flat[: frames * rows * band.count].reshape(frames, rows, -1) for flat in self._spectra)
-        groups = len(layout.edges) - 1
+        groups, pairs = len(layout.edges) - 1, pair_count(frames)
         total = np.zeros((groups, band.count), dtype=np.float32)
         part = np.empty((groups, band.count), dtype=np.float32)
+        windowed, packed = self._planes(band.length)
         for k, plane in enumerate(planes):
-            self.spectra(plane, int(offset[k]) - first + spare, self._window(band.length), band, re[k], im[k])
+            apply_strip_windows(plane, int(starts[k]), layout.strip_edges, windows, windowed)
+            row_spectra(windowed, band, packed, re[k], im[k])
             power(re[k], im[k], layout.edges, part)
             total += part
-        pairs = pair_count(frames)
-        shape = (2, STRIPS, layout.classes, pairs, band.count)
-        out = self._pairs[: 2 * groups * pairs * band.count].reshape(shape)
-        flat = out.reshape(2, groups, pairs, band.count)
-        all_pair_products(re, im, layout.edges, flat[0], flat[1])
-        power_sum = total.reshape(STRIPS, layout.classes, -1)
+        out = self._pairs[: 2 * groups * pairs * band.count].reshape(2, groups, pairs, band.count)
+        all_pair_products(re, im, layout.edges, out[0], out[1])
+        shape = (STRIPS, layout.classes)
         return Products(
-            out[0], out[1], power_sum, offset.astype(np.float64), band, layout.count.astype(np.float64), layout.height
+            out[0].reshape(*shape, pairs, -1),
+            out[1].reshape(*shape, pairs, -1),
+            total.reshape(*shape, -1),
+            offset.astype(np.float64),
+            band,
+            layout.count * np.maximum(share, LEAST_SHARE)[:, None],
+            layout.height,
         )
 
     def _window(self, length: int) -> Plane:
