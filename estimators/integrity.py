@@ -21,7 +21,8 @@ STATIC_PX = 1.0
 MAX_WHITENESS = 0.4
 FINE_FROM, MIDDLE = 0.75, (0.2, 0.45)
 FAR = 4.0
-MEDIAN_OF_NORMAL = 0.6745
+TOLERATED_PX, TOLERATED_SHARE, TOLERATED_LEAST_PX = 0.15, 0.05, 0.02  # lenses and slanting walls do that much
+MEDIAN_OF_NORMAL, MAX_USUAL = 0.6745, 2.0
 MAX_LOST_STRIPS = 5
 MAX_ALIEN, MAX_ALIEN_SHARE = 1.4, 0.15
 TINY = 1e-12
@@ -82,15 +83,17 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
 def quarrelling(fit: Fit, products: Products) -> Mask:
     """Strips whose own displacement lies far from that of the usual strip, shape (s,).
 
-    Far is measured by their own information and by how much strips differ in general, so that a picture that is
-    uneven everywhere loses none.
+    Far is measured by their own information and by how much strips differ in general, so that a picture that is a
+    little uneven everywhere loses none.
     """
     basis = motion_basis(fit.score.shape[1], len(fit.motion) == 2)[:, 0]
     own = np.einsum("i,sij,j->s", basis, fit.information, basis)
     step = (fit.score @ basis) / np.maximum(own, TINY)
-    deviation = np.abs(step - np.median(step)) * np.sqrt(np.maximum(own, TINY) / WINDOW_VARIANCE)
-    usual = max(1.0, float(np.median(deviation)) / MEDIAN_OF_NORMAL)
-    return np.asarray((deviation > FAR * usual) | (own <= 0.0))
+    apart = np.abs(step - np.median(step))
+    deviation = apart * np.sqrt(np.maximum(own, TINY) / WINDOW_VARIANCE)
+    usual = float(np.clip(np.median(deviation) / MEDIAN_OF_NORMAL, 1.0, MAX_USUAL))
+    tolerated = min(TOLERATED_PX, TOLERATED_SHARE * abs(float(fit.motion[0])) + TOLERATED_LEAST_PX)
+    return np.asarray(((deviation > FAR * usual) & (apart > tolerated)) | (own <= 0.0))
 
 
 def disturbed(fit: Fit, products: Products) -> Mask:

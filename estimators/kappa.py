@@ -40,8 +40,11 @@ class Kappa:
 
     @property
     def alarming(self) -> bool:
-        """Whether blur and displacement contradict each other."""
-        return abs(self.value - 1.0) > SURE * self.sigma + TOLERANCE
+        """Whether the blur is too short for the displacement: a frame was dropped, or period or exposure are wrong.
+
+        Blur that is too long raises no alarm: a codec or a soft lens looks like that and does no harm.
+        """
+        return 1.0 - self.value > SURE * self.sigma + TOLERANCE
 
 
 UNKNOWN = Kappa(math.nan, math.nan)

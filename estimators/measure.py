@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from axialnav.estimators.drift import cross_or_nan
 from axialnav.estimators.evenness import (
-    SURE_BEND,
     Residual,
-    bend_significance,
     residual,
     shake_variance,
     stranger,
@@ -25,17 +23,14 @@ from axialnav.estimators.integrity import (
     STATIC_PX,
     Choice,
     choose,
-    disturbed,
-    quarrelling,
     whiteness,
 )
-from axialnav.estimators.joint import Fit, best_bend, fit_motion
+from axialnav.estimators.joint import Fit
 from axialnav.estimators.kappa import blur_ratio
 from axialnav.estimators.layout import STRIPS
-from axialnav.estimators.pattern import SURE, pattern_power, without_pattern
 from axialnav.estimators.products import Products
+from axialnav.estimators.refine import fit_strips, follow
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
-from axialnav.estimators.roll import roll_step, unrolled
 from axialnav.estimators.search import STEP_PX, Profiles, lag_sums, profiles, unrelated_spread
 from axialnav.estimators.texture import matched_weight, shape_family, texture_power
 from axialnav.estimators.window import FrameWindow
@@ -136,10 +131,9 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     if reason:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
     start_px = float(grid[choice.index])
-    drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
-    products = window.following(start_px, drift.cross_px)
     strips = np.repeat(choice.agree, STRIPS // BANDS)
-    fit, lost = fit_strips(products.selected(strips), start_px, options)
+    drift, products = follow(window, start_px, strips, options.exposure_ratio)
+    fit, lost = fit_strips(products, start_px, options.exposure_ratio, options.consensus)
     if lost + int(np.sum(~strips)) > MAX_LOST_STRIPS:
         return refused(MotionReason.BANDS, signed=True, window_s=span_s, method="joint", bands=votes)
     left = residual(fit) if fit is not None else None
@@ -161,48 +155,6 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         acceleration_px=float(fit.motion[1]) if len(fit.motion) == 2 else 0.0,
         bands=votes,
     )
-
-
-def fit_strips(products: Products, start_px: float, options: JointOptions) -> tuple[Fit | None, int]:
-    """Fit, leave out strips that are disturbed or quarrel with the others, fit again; also how many were left out."""
-    products, fit = _level(products, fit_frames(products, start_px, options), options)
-    if fit is not None:
-        power, sigma = pattern_power(products, fit)
-        if power > SURE * sigma:
-            products = without_pattern(products, power)
-            fit = fit_frames(products, float(fit.motion[0]), options)
-    lost = 0
-    for doubt in (disturbed, quarrelling):
-        if fit is None or not options.consensus:
-            break
-        bad = doubt(fit, products)
-        lost += int(bad.sum())
-        if lost > MAX_LOST_STRIPS:
-            break
-        if bad.any():
-            products = products.selected(~bad)
-            fit = fit_frames(products, float(fit.motion[0]), options)
-    return fit, lost
-
-
-def _level(products: Products, fit: Fit | None, options: JointOptions) -> tuple[Products, Fit | None]:
-    """Take out the camera's roll as long as it shows."""
-    for _ in range(MAX_ROLL_STEPS):
-        shift = roll_step(fit, products.height) if fit is not None else None
-        if fit is None or shift is None:
-            break
-        products = unrolled(products, shift)
-        fit = fit_frames(products, float(fit.motion[0]), options)
-    return products, fit
-
-
-def fit_frames(products: Products, start_px: float, options: JointOptions) -> Fit | None:
-    """Displacement alone, then with an acceleration if that is significant."""
-    fit = fit_motion(products, np.array([start_px]), options.exposure_ratio)
-    if fit is None or bend_significance(fit) < SURE_BEND:
-        return fit
-    start = np.array([float(fit.motion[0]), best_bend(products, fit)])
-    return fit_motion(products, start, options.exposure_ratio) or fit
 
 
 def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, options: JointOptions) -> str:

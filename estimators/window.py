@@ -166,7 +166,7 @@ class _Buffers:
             total.reshape(*shape, -1),
             offset.astype(np.float64),
             band,
-            layout.count * np.maximum(share, LEAST_SHARE)[:, None],
+            np.asarray(layout.count * np.maximum(share, LEAST_SHARE)[:, None], dtype=np.float64),
             layout.height,
         )
 

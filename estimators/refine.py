@@ -1,0 +1,114 @@
+"""From the grid point of the search to a fit: follow the wall, level the camera, leave out what is not wall."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.drift import Drift
+from axialnav.estimators.evenness import SURE_BEND, bend_significance
+from axialnav.estimators.integrity import MAX_LOST_STRIPS, disturbed, quarrelling
+from axialnav.estimators.joint import Fit, best_bend, fit_motion
+from axialnav.estimators.pattern import SURE, pattern_power, without_pattern
+from axialnav.estimators.products import Products
+from axialnav.estimators.roll import roll_step, unrolled
+from axialnav.estimators.window import FrameWindow
+
+Mask = NDArray[np.bool_]
+MAX_ROLL_STEPS = 4
+UNMOVED = Drift(0.0, False)
+
+
+def follow(window: FrameWindow, start_px: float, strips: Mask, exposure_ratio: float) -> tuple[Drift, Products]:
+    """Products of some strips from windows that follow the wall, and the drift they follow across the rows.
+
+    A drift that makes the frames less alike is that of something else (a slanting cable, say) and is not followed.
+    """
+    drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
+    products = window.following(start_px, drift.cross_px).selected(strips)
+    if abs(drift.cross_px) * (len(window.order) - 1) < window.bin_height:
+        return drift, products
+    with_drift = _likeness(fit_motion(products, np.array([start_px]), exposure_ratio, passes=1))
+    products = window.following(start_px).selected(strips)
+    if _likeness(fit_motion(products, np.array([start_px]), exposure_ratio, passes=1)) >= with_drift:
+        return UNMOVED, products
+    return drift, window.following(start_px, drift.cross_px).selected(strips)
+
+
+def _likeness(fit: Fit | None) -> float:
+    """Share of the power that moves with the wall [-]."""
+    return float(fit.texture.sum() / (fit.texture.sum() + fit.noise.sum())) if fit is not None else 0.0
+
+
+def fit_strips(products: Products, start_px: float, exposure_ratio: float, consensus: bool) -> tuple[Fit | None, int]:
+    """Fit, leave out strips that are disturbed or quarrel with the others, fit again; also how many were left out.
+
+    Parameters
+    ----------
+    products
+        Products of windows that follow the wall.
+    start_px
+        Displacement per frame [px], to half a pixel.
+    exposure_ratio
+        Exposure over period.
+    consensus
+        Whether strips may be left out.
+    """
+    fit = fit_frames(products, start_px, exposure_ratio)
+    lost = 0
+    for doubt in (disturbed, _no_roll) if consensus else ():
+        bad = doubt(fit, products) if fit is not None else np.zeros(0, dtype=np.bool_)
+        lost += int(bad.sum())
+        if fit is None or lost > MAX_LOST_STRIPS:
+            return fit, lost
+        if bad.any():
+            products = products.selected(~bad)
+            fit = fit_frames(products, float(fit.motion[0]), exposure_ratio)
+    products, fit = _level(products, fit, exposure_ratio)
+    products, fit = _unpatterned(products, fit, exposure_ratio)
+    bad = quarrelling(fit, products) if fit is not None and consensus else np.zeros(0, dtype=np.bool_)
+    lost += int(bad.sum())
+    if fit is None or not bad.any() or lost > MAX_LOST_STRIPS:
+        return fit, lost
+    return fit_frames(products.selected(~bad), float(fit.motion[0]), exposure_ratio), lost
+
+
+def _no_roll(fit: Fit, products: Products) -> Mask:
+    """Strips that quarrel with the others in a way that no roll of the camera explains."""
+    bad = quarrelling(fit, products)
+    if not bad.any() or roll_step(fit, products.height) is None:
+        return bad
+    levelled, level = _level(products, fit, 0.0)
+    explained = level is not None and not quarrelling(level, levelled).any()
+    return np.zeros_like(bad) if explained or int(bad.sum()) > MAX_LOST_STRIPS else bad
+
+
+def _level(products: Products, fit: Fit | None, exposure_ratio: float) -> tuple[Products, Fit | None]:
+    """Take out the camera's roll as long as it shows."""
+    for _ in range(MAX_ROLL_STEPS):
+        shift = roll_step(fit, products.height) if fit is not None else None
+        if fit is None or shift is None:
+            break
+        products = unrolled(products, shift)
+        fit = fit_frames(products, float(fit.motion[0]), exposure_ratio)
+    return products, fit
+
+
+def _unpatterned(products: Products, fit: Fit | None, exposure_ratio: float) -> tuple[Products, Fit | None]:
+    """Take out a white pattern of the pixels if there is one."""
+    if fit is None:
+        return products, fit
+    power, sigma = pattern_power(products, fit)
+    if power <= SURE * sigma:
+        return products, fit
+    products = without_pattern(products, power)
+    return products, fit_frames(products, float(fit.motion[0]), exposure_ratio)
+
+
+def fit_frames(products: Products, start_px: float, exposure_ratio: float) -> Fit | None:
+    """Displacement alone, then with an acceleration if that is significant."""
+    fit = fit_motion(products, np.array([start_px]), exposure_ratio)
+    if fit is None or bend_significance(fit) < SURE_BEND:
+        return fit
+    start = np.array([float(fit.motion[0]), best_bend(products, fit)])
+    return fit_motion(products, start, exposure_ratio) or fit
