@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.estimate import estimate_motion
+from axialnav.replay.simulate.render import Rendering
 from tests.bench.motion_bound import displacement_bound
 from tests.bench.motion_scenes import EXPOSURE_S, PERIOD_S, WALLS, Condition, draw
 
@@ -67,6 +68,12 @@ class Trials:
         return int(np.sum(np.abs(self.error) > DROP_SHARE * np.abs(self.truth)))
 
 
+def per_period(picture: Rendering) -> float:
+    """True displacement per period [px]; with a frame dropped or repeated that is not the mean over the frames."""
+    trajectory = picture.scene.trajectory
+    return picture.displacement_px if trajectory.frame_times is None else trajectory.displacement_px
+
+
 def run_trials(
     condition: Condition, count: int, method: str = "joint", first: int = 0, width: int = 960, height: int = 540
 ) -> Trials:
@@ -78,7 +85,7 @@ def run_trials(
         estimate = estimate_motion(frames, method=method, frame_period_s=PERIOD_S, exposure_s=EXPOSURE_S)
         reasons[str(estimate.reason)] += 1
         if estimate.accepted:
-            truth = picture.displacement_px if estimate.signed else abs(picture.displacement_px)
+            truth = per_period(picture) if estimate.signed else abs(per_period(picture))
             bound = displacement_bound(picture.scene, trial % WALLS, 5) if condition.contrast else float("nan")
             rows.append((estimate.displacement_px - truth, estimate.sigma_px, bound, truth))
     columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T

@@ -27,21 +27,26 @@ def test_the_slider_runs_at_the_speed_it_was_set_to(shared: Path) -> None:
 
 
 def test_sigma_is_honest_on_real_frames(shared: Path) -> None:
-    """Upper and lower half of the poster are two measurements of one motion; their difference must fit their sigmas."""
+    """Upper and lower half of the poster are two measurements of one motion.
+
+    They differ by up to 3 % because the halves are not equally far, slowly over the run; from one window to the next
+    the difference changes by no more than the sigmas allow.
+    """
     flight = load_flight(shared / "flights" / "davis_slider_far")
     names = flight.tables["cam0"].columns["filename"].tolist()[10:120]
     frames = [cv2.imread(str(flight.path / "mav0/cam0/data" / name), cv2.IMREAD_GRAYSCALE) for name in names]
-    z = []
+    gaps, sigmas = [], []
     for k in range(0, len(frames) - 5, 5):
         halves = [
             estimate_motion([f[rows] for f in frames[k : k + 5]], frame_period_s=0.0466)
             for rows in (slice(0, 90), slice(90, 180))
         ]
         if all(half.accepted for half in halves):
-            gap = halves[0].displacement_px - halves[1].displacement_px
-            z.append(gap / np.hypot(halves[0].sigma_px, halves[1].sigma_px))
-    assert len(z) >= 10
-    assert np.std(z) < 3.0
+            gaps.append(halves[0].displacement_px - halves[1].displacement_px)
+            sigmas.append(np.hypot(halves[0].sigma_px, halves[1].sigma_px))
+    assert len(gaps) >= 10
+    changes = np.diff(gaps) / np.hypot(sigmas[1:], sigmas[:-1])
+    assert np.sqrt(np.mean(changes**2)) < 2.0
 
 
 def test_a_hand_held_camera_agrees_with_registration(shared: Path) -> None:
