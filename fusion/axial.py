@@ -81,6 +81,9 @@ class AxialFilter:
         self.driver = _driver(config)
         self._ekf: Any = ExtendedKalmanFilter(dim_x=4, dim_z=1)
         self._scratch = new_scratch()
+        leak = config.gravity_m_s2 * config.axial.sigma_tilt_rad
+        felt = config.start.sigma_accel_bias_m_s2 if self.driver is Kind.IMU else 0.0
+        self._bias_variance = leak**2 + felt**2
         self._heading_rad = 0.0
         self._row, self._F, self._R = np.empty(6), np.empty((9, 3)), np.empty((3, 3))
 
@@ -117,7 +120,7 @@ class AxialFilter:
         x[POS : POS + 3], x[VEL : VEL + 3] = initial.position_m, initial.velocity_m_s
         x[QUAT : QUAT + 4] = self._attitude(roll, pitch, yaw)
         tune, held = self.config, self.held
-        bias = (tune.gravity_m_s2 * tune.axial.sigma_tilt_rad) ** 2
+        bias = self._bias_variance
         axial = [initial.sigma_position_m**2, initial.sigma_velocity_m_s**2, bias, tune.flow.scale_sigma**2]
         core["P"][0] = held.first(initial.sigma_position_m**2, tune.range.offset_sigma_m**2)
         core["P"][0] += held.E @ np.diag(axial) @ held.E.T
@@ -206,7 +209,7 @@ class AxialFilter:
         keep = math.exp(-dt / tune.tilt_time_s)
         ekf.F = np.array([[1, dt, -0.5 * dt * dt, 0], [0, 1, -dt, 0], [0, 0, keep, 0], [0, 0, 0, 1]])
         ekf.B = np.array([0.5 * dt * dt, dt, 0.0, 0.0])
-        bias = (self.config.gravity_m_s2 * tune.sigma_tilt_rad) ** 2 * (1.0 - keep * keep)
+        bias = self._bias_variance * (1.0 - keep * keep)
         q = noise * noise
         ekf.Q = np.diag([q * dt**3 / 3, q * dt, bias, self.config.flow.scale_walk**2 * dt])
         ekf.Q[0, 1] = ekf.Q[1, 0] = q * dt * dt / 2

@@ -185,8 +185,9 @@ class AxialTuning(_Table, frozen=True, kw_only=True):
 
     ``heading_rad`` is the autopilot's yaw when the vehicle looks along the world's x axis; without it the first
     attitude is taken to look where ``[initial]`` says.  The error of the axial acceleration is the tilt's error
-    ``sigma_tilt_rad`` times gravity, alike over ``tilt_time_s``; on top comes white noise of ``accel_noise``
-    (accelerometer) or ``thrust_noise`` (tilt alone: drag and climbing are not seen) [m s^-2 Hz^-1/2].  Across the
+    ``sigma_tilt_rad`` times gravity (and the accelerometer's bias, ``start.sigma_accel_bias_m_s2``), alike over
+    ``tilt_time_s``; on top comes white noise of ``accel_noise`` (accelerometer) or ``thrust_noise`` (tilt alone: drag
+    and climbing are not seen) [m s^-2 Hz^-1/2].  Across the
     corridor the vehicle is expected to move with ``lateral_speed_m_s``, in stretches of ``lateral_time_s``.  An
     accelerometer that differs from the tilt by more than ``doubt_m_s2``, as a mean over two seconds, is flagged and
     not used.
@@ -194,7 +195,7 @@ class AxialTuning(_Table, frozen=True, kw_only=True):
 
     heading_rad: float | None = None
     sigma_tilt_rad: Positive = 0.012
-    tilt_time_s: Positive = 5.0
+    tilt_time_s: Positive = 15.0
     sigma_yaw_rad: Positive = 0.05
     accel_noise: Positive = 0.05
     thrust_noise: Positive = 0.5

@@ -88,7 +88,7 @@ class CorridorEstimator:
         self._packer = Packer(self.config)
         self._cameras = CameraFeed(self.config)
         self._sources = build_sources(self.config)
-        self._settings = build_settings(self.config)
+        self._settings = self._build_settings()
         # plain lists and one-event buffers: indexing records and making arrays would cost more than the filter itself
         self._is_imu: list[bool] = (self._sources["kind"] == int(Kind.IMU)).tolist()
         self._enabled: list[bool] = self._sources["enabled"].tolist()

@@ -10,7 +10,7 @@ import numpy as np
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import FlightError
-from axialnav.models.rig import AnySensor, Camera, Gps, Imu
+from axialnav.models.rig import AnySensor, AttitudeSource, Camera, Gps, Imu
 from axialnav.replay.flight import Flight, GpsReference, SensorTable, Truth
 from axialnav.replay.readers import columns
 from axialnav.replay.readers.csv import Rows, read_rows
@@ -31,7 +31,7 @@ def read_flight_folder(path: Path) -> Flight:
     Raises
     ------
     FlightError
-        No flight there, a file that cannot be understood, or neither IMU samples nor camera frames in it.
+        No flight there, a file that cannot be understood, or no IMU samples, camera frames or attitudes in it.
     """
     try:
         return _read(*_locate(path))
@@ -46,13 +46,14 @@ def _read(root: Path, mav0: Path) -> Flight:
     toml = read_flight_toml(root / "flight.toml")
     specs, tables, gps = _read_sensors(mav0, drops)
     truth = _read_truth(mav0 / TRUTH_FOLDER, drops)
-    if not any(len(tables[name]) and isinstance(spec, Imu | Camera) for name, spec in specs.items() if name in tables):
+    driving = (name for name, spec in specs.items() if isinstance(spec, Imu | Camera | AttitudeSource))
+    if not any(len(tables[name]) for name in driving if name in tables):
         found = ", ".join(sorted(folder.name for folder in mav0.iterdir() if folder.is_dir())) or "nothing"
         worst = sorted(drops.as_tuple(), key=lambda drop: -drop.count)[:3]
         why = "; ".join(f"{drop.sensor}: {drop.reason} ({drop.count})" for drop in worst)
         raise FlightError(
-            f"{mav0}: no usable IMU sample and no camera frame (found: {found}){'; ' + why if why else ''}; "
-            f"a flight needs at least imu0/data.csv or cam0/data.csv"
+            f"{mav0}: no usable IMU sample, camera frame or attitude (found: {found}){'; ' + why if why else ''}; "
+            f"a flight needs at least imu0/data.csv, cam0/data.csv or att0/data.csv"
         )
     return _assemble(root, toml, specs, tables, truth, gps, drops)
 

@@ -39,12 +39,12 @@ def tof(yaml: str, *lines: str) -> Callable[[Path], object]:
 
 
 ERRORS: dict[str, tuple[Callable[[Path], object], str]] = {
-    "empty IMU file": (imu_csv(), r"no usable IMU sample .*found: imu0.*imu0: no usable row"),
+    "empty IMU file": (imu_csv(), r"no usable IMU sample.*found: imu0.*imu0: no usable row"),
     "IMU header only": (imu_csv(IMU_HEADER), r"no usable IMU sample"),
     "all rows bad": (imu_csv(IMU_HEADER, *["1,2"] * 9), r"no usable IMU sample.*row too short \(needs 7 values\)"),
     "no IMU file": (
         lambda flight: (flight / "mav0" / "imu0" / "data.csv").unlink(),
-        r"no usable IMU sample.*imu0: no data.csv.*needs at least imu0/data.csv or cam0/data.csv",
+        r"no usable IMU sample.*imu0: no data.csv.*needs at least imu0/data.csv, cam0/data.csv or att0/data.csv",
     ),
     "columns missing": (imu_csv("1,2,3", "2,2,3"), r"imu0/data.csv: 3 columns, needs at least 7: timestamp, w_RS_S_x"),
     "column missing by name": (
