@@ -17,7 +17,7 @@ from axialnav.estimators.texture import matched_weight, shape_family, texture_po
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
-COLUMNS = 48
+COLUMNS = 40
 COLUMN_WIDTH = 8
 REACH_PX = 24.0
 MANY_FRAMES = 5

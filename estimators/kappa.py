@@ -20,7 +20,7 @@ from axialnav.estimators.whittle import parabola, transfer, whittle_costs
 
 Array = NDArray[np.float64]
 MIN_LENGTH_PX = 2.0
-RATIOS = np.linspace(0.3, 2.5, 56)
+RATIOS = np.linspace(0.3, 2.2, 39)
 GROUPS_PER_RIPPLE = 12.0
 SURE = 4.0
 TOLERANCE = 0.25
@@ -28,6 +28,7 @@ MISMATCH = 0.05  # relative error of power laws and Gaussian lenses as spectra o
 UNSURE = 12.0  # log-likelihood by which another ratio must win
 LOWEST_SHARE = 0.2  # of 1 / l: below, stains and lamps spoil the power law
 MIN_GROUPS = 12
+SHAPE_STRIDE = 2
 TINY = 1e-9
 
 
@@ -82,7 +83,7 @@ def blur_ratio(fit: Fit, band: Band, rows: Array, exposure_ratio: float) -> Kapp
     tables = grouped(transfer(RATIOS * expected_px, band.frequency(), 1, 1.0))
     cost = np.empty(len(RATIOS))
     number = np.empty(len(RATIOS), dtype=np.int64)
-    whittle_costs(np.maximum(grouped(power), TINY), tables, grouped(blur_shapes(band)), cost, number)
+    whittle_costs(np.maximum(grouped(power), TINY), tables, grouped(blur_shapes(band)[::SHAPE_STRIDE]), cost, number)
     looks = 1.0 / (1.0 / (float(rows.sum()) * size) + MISMATCH**2)
     return _read(cost * looks)
 

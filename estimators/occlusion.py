@@ -25,15 +25,15 @@ LEAST_SHARE = 0.3
 @kernel
 def _cell_power(plane: Plane, edges: NDArray[np.int64], out: Array) -> None:
     """Sum of squares in every cell (s, b)."""
-    out[:] = 0.0
+    column = np.empty(plane.shape[1], dtype=np.float32)
     for s in range(out.shape[0]):
+        column[:] = np.float32(0.0)
         for r in range(edges[s], edges[s + 1]):
             line = plane[r]
-            for b in range(out.shape[1]):
-                total = np.float32(0.0)
-                for c in range(b * CELL_PX, (b + 1) * CELL_PX):
-                    total += line[c] * line[c]
-                out[s, b] += total
+            for c in range(column.shape[0]):
+                column[c] += line[c] * line[c]
+        for b in range(out.shape[1]):
+            out[s, b] = column[b * CELL_PX : (b + 1) * CELL_PX].sum()
 
 
 class OccluderFinder:

@@ -106,9 +106,11 @@ def apply_window(rows: Plane, start: int, window: Plane, out: Plane) -> None:
 def apply_strip_windows(rows: Plane, start: int, edges: NDArray[np.int64], windows: Plane, out: Plane) -> None:
     """:func:`apply_window` with a window of its own for every strip: ``windows`` (s, length), ``edges`` (s + 1,)."""
     for s in range(windows.shape[0]):
+        window = windows[s]
         for r in range(edges[s], edges[s + 1]):
-            for c in range(windows.shape[1]):
-                out[r, c] = rows[r, start + c] * windows[s, c]
+            line, target = rows[r, start : start + window.shape[0]], out[r]
+            for c in range(window.shape[0]):
+                target[c] = line[c] * window[c]
 
 
 def tukey(length: int, share: float = 0.12) -> Plane:
