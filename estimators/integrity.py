@@ -115,11 +115,16 @@ def disturbed(fit: Fit, products: Products) -> Mask:
     return np.asarray(bad)
 
 
-def whiteness(fit: Fit) -> float:
-    """Fine over middle part of the repeating power [-]: about 1 for a pixel pattern, near 0 behind any lens."""
-    power = fit.coherent.sum(axis=0)
-    fine, middle = (
-        power[int(FINE_FROM * len(power)) :],
-        power[int(MIDDLE[0] * len(power)) : int(MIDDLE[1] * len(power))],
-    )
+def whiteness(fit: Fit, rows: Array) -> float:
+    """Fine over middle part of the repeating power [-]: about 1 for a pixel pattern, near 0 behind any lens.
+
+    0 where the fine part does not stand out from its own noise.  ``rows`` (c,) are the rows behind the spectra.
+    """
+    power, count = fit.coherent.sum(axis=0), fit.coherent.shape[1]
+    first = int(FINE_FROM * count)
+    fine, middle = power[first:], power[int(MIDDLE[0] * count) : int(MIDDLE[1] * count)]
+    frames = fit.score.shape[1]
+    spread = np.sqrt(np.sum(np.mean(fit.noise[:, first:], axis=1) ** 2 / rows) / len(fine)) / frames
+    if float(fine.mean()) < FAR * float(spread):
+        return 0.0
     return float(fine.mean() / max(float(middle.mean()), TINY))

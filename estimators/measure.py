@@ -65,7 +65,8 @@ class JointOptions:
     evenness
         Refuse windows in which a frame was dropped or repeated.
     kappa
-        Refuse if the blur of the exposure contradicts the displacement.
+        Refuse two frames whose blur is too short for their displacement.  With more frames the ratio is only reported:
+        a dropped frame shows in their spacing, and a codec that eats fine detail must not silence the estimate.
     """
 
     frame_period_s: float
@@ -141,7 +142,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     if fit is None or left is None or reason:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
     kappa = blur_ratio(fit, products.band, products.rows.sum(axis=0), options.exposure_ratio)
-    if options.kappa and kappa.alarming:
+    if options.kappa and frames == 2 and kappa.alarming:
         return refused(MotionReason.KAPPA, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
     return MotionEstimate(
         float(fit.motion[0]),
@@ -165,7 +166,7 @@ def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, option
         return MotionReason.PAIR
     if options.evenness and uneven(fit, left):
         return MotionReason.UNEVEN
-    if abs(float(fit.motion[0])) < STATIC_PX and whiteness(fit) > MAX_WHITENESS:
+    if abs(float(fit.motion[0])) < STATIC_PX and whiteness(fit, products.rows.sum(axis=0)) > MAX_WHITENESS:
         return MotionReason.STATIC
     if not math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, products.frames)) <= MAX_SIGMA_PX:
         return MotionReason.SIGMA
