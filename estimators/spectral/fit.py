@@ -1,0 +1,207 @@
+"""The maximum of the likelihood over all displacements, its uncertainty, and how much better it is than the others."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.estimators.spectral.picture import WINDOW_LOOKS, Spectra
+from axialnav.estimators.spectral.problem import Problem, pose
+from axialnav.estimators.spectral.search import climb_all, look, peaks, smooth_fit
+from axialnav.estimators.spectral.whittle import BLUR, NOISE, PARAMETERS, SHIFT, TEXTURE, UNTIED
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+WIDE_REACH_PX = 24.0  # copies nearer than this leave a comb too wide for the tables
+LOWEST, LOW_STARTS = 0.06, 14
+MOST, RIVAL_SHARE = 5, 0.4
+STEPS = 12
+BLUR_STEP = 0.1  # relative
+BLUR_RATIOS = (0.02, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+SAME = 0.01
+SEPARATE, SEPARATE_PX = 0.1, 0.3
+PRIOR_DOF, TINY = 6.0, 1e-12
+MISFIT = 1.25  # the spectra of walls are only nearly smooth; measured on photographs
+
+
+def light_beyond(problem: Problem, theta: Array, model: Array, frequency: float) -> float:
+    """Log-likelihood per row of texture above a frequency [cycles/px], against noise alone.
+
+    A spectrum that fades and stays dark may be that of a lens out of focus; only light on both sides makes a dark line.
+    """
+    noise = math.exp(float(theta[NOISE]))
+    gain = problem.power / noise - problem.power / model - np.log(model / noise)
+    return float(problem.weight @ (gain * (problem.frequency > frequency)))
+
+
+def _inverse(J: Array) -> Array:
+    """Inverse of an information; infinite if the picture does not tell everything asked."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(J), TINY))
+    scaled = J * scale * scale[:, None]
+    if float(np.linalg.eigvalsh(scaled)[0]) < TINY:
+        return np.full_like(J, math.inf)
+    return np.asarray(np.linalg.inv(scaled) * scale * scale[:, None])
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A value, and its misfit per row."""
+
+    value_px: float
+    cost: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best model of a spectrum.
+
+    Parameters
+    ----------
+    theta
+        Parameters, shape (p,).
+    sigma_px
+        Standard deviation of the displacement (or of the blur, if that is what was searched) from the spread of the
+        strips [px].
+    margin
+        Log-likelihood by which it beats the best other value, no motion among them.
+    light
+        Log-likelihood of light beyond the first dark line.
+    rival_px
+        That other value [px].
+    excess
+        Mean squared misfit over the one that the strips' spread explains; 1 for the right model.
+    cost
+        Misfit per row.
+    """
+
+    theta: Array
+    sigma_px: float
+    margin: float
+    light: float
+    rival_px: float
+    excess: float
+    cost: float
+
+
+def conclude(spectra: Spectra, problem: Problem, theta: Array, tie: float, which: int, rivals: list[Rival]) -> Fit:
+    """Uncertainty and doubts of the model at ``theta``, the maximum of ``problem`` (all frequencies, one by one)."""
+    model, gradient = problem.model(theta, tie)
+    rows = float(spectra.rows.sum())
+    strips = spectra.power[:, problem.bins] / model - 1.0
+    dispersion = float(np.mean(spectra.rows @ strips**2)) / (len(spectra.rows) - 1)
+    other = [BLUR] if tie < 0.0 and which == SHIFT and problem.frames > 1 else []
+    free = [which, *other, *range(TEXTURE, PARAMETERS)]
+    inverse = _inverse(problem.information(model, gradient)[np.ix_(free, free)])
+    if not np.all(np.isfinite(inverse)):
+        return Fit(theta, math.inf, 0.0, 0.0, math.nan, math.nan, math.inf)
+    influence = gradient[:, free] @ inverse[0]
+    scores = spectra.rows * (strips @ influence) / rows
+    expected = inverse[0, 0] / rows * dispersion * WINDOW_LOOKS
+    freedom = len(scores) - 1
+    spread = float(np.sum((scores - scores.mean()) ** 2)) * len(scores) / freedom
+    variance = (freedom * spread + PRIOR_DOF * expected) / (freedom + PRIOR_DOF)
+    excess = float(np.mean((problem.power / model - 1.0) ** 2)) * rows / dispersion
+    best = min(rivals, key=lambda rival: rival.cost)
+    others = [r for r in rivals if abs(r.value_px - best.value_px) > max(SEPARATE * best.value_px, SEPARATE_PX)]
+    rival = min(others, key=lambda other: other.cost, default=best)
+    per_look = rows / (dispersion * WINDOW_LOOKS)
+    dark = 1.0 / (problem.frames * max(float(theta[which]), TINY))
+    light = light_beyond(problem, theta, model, dark) * per_look
+    margin = (rival.cost - best.cost) * per_look
+    sigma = MISFIT * math.sqrt(variance * max(1.0, excess))
+    return Fit(theta, sigma, margin, light, rival.value_px, excess, best.cost)
+
+
+def best_displacement(spectra: Spectra, usable: Mask, frames: int, ratio: float, reach_px: float) -> Fit:
+    """Displacement of a composite.
+
+    Parameters
+    ----------
+    spectra
+        Of the composite.
+    usable
+        Frequencies to use, shape (f,).
+    frames
+        N.
+    ratio
+        Exposure over frame period.
+    reach_px
+        Largest displacement to look for [px].
+    """
+    problem = pose(spectra, usable, frames)
+    found = starts(spectra, usable, frames, ratio, reach_px)
+    return _best(spectra, problem, found, ratio, SHIFT)
+
+
+def free_blur(spectra: Spectra, usable: Mask, frames: int, near: Fit) -> Fit:
+    """The same with a blur that is no longer tied to the displacement: for exposures that nobody knows."""
+    problem = pose(spectra, usable, frames)
+    free = np.ones(PARAMETERS, dtype=np.bool_)
+    found = []
+    for ratio in BLUR_RATIOS:
+        start = near.theta.copy()
+        start[BLUR] = ratio * start[SHIFT]
+        found.append(problem.climb(start, UNTIED, free, STEPS, fresh=True))
+    theta, cost = min(found, key=lambda item: item[1])
+    rivals = [Rival(float(theta[SHIFT]), cost), Rival(near.rival_px, math.inf)]
+    return replace(conclude(spectra, problem, theta, UNTIED, SHIFT, rivals), margin=near.margin)
+
+
+def best_blur(spectra: Spectra, usable: Mask, low_px: float, high_px: float) -> Fit:
+    """Blur of one exposure between two lengths [px] from spectra of single or aligned frames."""
+    problem = pose(spectra, usable, 1)
+    smooth, _ = smooth_fit(problem)
+    grid = np.geomspace(low_px, high_px, max(3, math.ceil(math.log(high_px / low_px) / BLUR_STEP)))
+    thetas, cost = climb_all(problem, smooth, grid, UNTIED, BLUR)
+    within = (thetas[:, BLUR] > low_px) & (thetas[:, BLUR] < high_px)
+    order = np.argsort(np.where(within, cost, math.inf))[:MOST]
+    return _best(spectra, problem, [thetas[i] for i in order], UNTIED, BLUR)
+
+
+def _best(spectra: Spectra, problem: Problem, found: list[Array], tie: float, which: int) -> Fit:
+    """Climb from every start on all frequencies and keep the highest."""
+    free = np.ones(PARAMETERS, dtype=np.bool_)
+    free[BLUR if which == SHIFT else SHIFT] = False
+    smooth, cost = smooth_fit(problem)
+    best, least, rivals = smooth, math.inf, [Rival(0.0, cost)]
+    for start in found:
+        theta, cost = problem.climb(start, tie, free, STEPS, fresh=True)
+        rivals.append(Rival(float(theta[which]), cost))
+        if cost < least:
+            best, least = theta, cost
+    return conclude(spectra, problem, best, tie, which, rivals)
+
+
+def starts(spectra: Spectra, usable: Mask, frames: int, ratio: float, reach_px: float) -> list[Array]:
+    """Parameters to climb from, most promising first."""
+    spread = frames - 1 + ratio
+    coarse = pose(spectra, usable, frames, WIDE_REACH_PX)
+    smooth, still = smooth_fit(coarse)
+    low = WIDE_REACH_PX / spread
+    grid = np.geomspace(LOWEST * low, low, LOW_STARTS)
+    thetas, cost = climb_all(coarse, smooth, grid, ratio)
+    found = [(theta, still - float(value)) for theta, value in zip(thetas, cost, strict=True)]
+    while low < reach_px:
+        high = min(2.0 * low, reach_px)
+        level = pose(spectra, usable, frames, high * spread)
+        at, gain = look(level, smooth, low, high, ratio, spectra.length)
+        for i in _tops(gain):
+            theta = smooth.copy()
+            theta[SHIFT] = at[i]
+            found.append((theta, float(gain[i])))
+        low = high
+    found.sort(key=lambda item: -item[1])
+    best = found[0][1]
+    kept: list[Array] = []
+    for theta, promise in found:
+        near = any(abs(theta[SHIFT] - other[SHIFT]) < SAME * other[SHIFT] for other in kept)
+        if promise >= RIVAL_SHARE * best and not near and len(kept) < MOST:
+            kept.append(theta)
+    return kept
+
+
+def _tops(gain: Array) -> list[int]:
+    return [int(i) for i in peaks(np.arange(len(gain), dtype=np.float64), gain, MOST)]

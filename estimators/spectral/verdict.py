@@ -1,0 +1,45 @@
+"""Whether frames can be read at all, and whether a fitted spectrum is to be believed."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from axialnav.estimators.frames import Image, unusable
+from axialnav.estimators.result import MotionReason
+from axialnav.estimators.spectral.fit import Fit
+
+MIN_MARGIN, MIN_LIGHT = 6.0, 3.0
+MAX_EXCESS, MAX_CODED_EXCESS = 1.45, 3.5  # a codec's noise is not white
+MAX_SHARE, MAX_SIGMA_PX = 0.1, 0.5
+
+
+def why_unusable(stack: list[Image]) -> str:
+    """Why these frames cannot be read (black, saturated, constant, one delivered twice); "" if they can."""
+    reason = next((why for why in map(unusable, stack) if why), "")
+    if not reason and any(_same(a, b) for a, b in pairwise(stack)):
+        reason = MotionReason.DUPLICATED
+    return reason
+
+
+def _same(a: Image, b: Image) -> bool:
+    return bool((a[0] == b[0]).all() and (a == b).all())
+
+
+def why_refused(fit: Fit, length_px: float, shortest_px: float, max_excess: float = MAX_EXCESS) -> str:
+    """Why a fit is not believed; "" if it is.
+
+    It must beat every other length, no motion among them, show light beyond its first dark line,
+    leave residuals no larger than the strips of the picture differ among themselves, and be longer than what can be
+    told from a lens.
+    """
+    if (
+        not (math.isfinite(fit.sigma_px) and math.isfinite(length_px))
+        or min(fit.margin - MIN_MARGIN, fit.light - MIN_LIGHT) < 0.0
+    ):
+        return MotionReason.AMBIGUOUS
+    if fit.excess > max_excess:
+        return MotionReason.MODEL
+    if length_px < shortest_px:
+        return MotionReason.SHORT
+    return MotionReason.SIGMA if fit.sigma_px > min(MAX_SHARE * length_px, MAX_SIGMA_PX) else ""

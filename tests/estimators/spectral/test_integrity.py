@@ -1,0 +1,97 @@
+"""What a spectrum cannot tell is refused; nothing accepted is wrong."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from axialnav.estimators.errors import FrameError
+from axialnav.estimators.result import MotionReason
+from axialnav.estimators.spectral import fit_composite, fit_single
+from axialnav.replay.simulate.render import dropped_frame
+from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered, texture
+
+FAST_PX = (3.4, 9.1, 17.0, 33.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_has_no_motion(seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(100.0, 8.0, (5, 360, 640)).astype(np.uint8)
+    assert not fit_composite(noise, PERIOD_S, EXPOSURE_S).accepted
+    assert not fit_composite(noise, PERIOD_S).accepted
+    assert not fit_single(noise[:1], PERIOD_S, EXPOSURE_S).accepted
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_wall_that_stands_still_is_not_given_a_speed(seed: int) -> None:
+    frames = rendered(0.0, 700 + seed, bright=True, contrast=0.1).frames
+    assert not fit_composite(frames, PERIOD_S, EXPOSURE_S).accepted
+    assert not fit_single(frames[:1], PERIOD_S, EXPOSURE_S).accepted
+
+
+@pytest.mark.parametrize("displacement_px", FAST_PX)
+def test_a_dropped_frame_is_refused_or_does_no_harm(displacement_px: float) -> None:
+    times = dropped_frame(5, 1)
+    picture = rendered(displacement_px, 720, bright=True, contrast=0.1, frame_times=times)
+    estimate = fit_composite(picture.frames, PERIOD_S, EXPOSURE_S)
+    assert not estimate.accepted or estimate.displacement_px == pytest.approx(displacement_px, rel=0.2)
+
+
+@pytest.mark.parametrize("displacement_px", FAST_PX)
+def test_a_lens_out_of_focus_is_refused_or_does_no_harm(displacement_px: float) -> None:
+    picture = rendered(displacement_px, 740, bright=True, contrast=0.1, camera={"lens_sigma_px": 4.0})
+    composite = fit_composite(picture.frames, PERIOD_S, EXPOSURE_S)
+    single = fit_single(picture.frames[:1], PERIOD_S, EXPOSURE_S)
+    for estimate in (composite, single):
+        assert not estimate.accepted or estimate.displacement_px == pytest.approx(displacement_px, rel=0.2)
+
+
+def test_too_slow_for_the_exposure_is_said_by_name() -> None:
+    picture = rendered(4.0, 760, bright=True, contrast=0.1, frames=1)
+    estimate = fit_single(picture.frames, PERIOD_S, EXPOSURE_S)
+    assert not estimate.accepted
+    assert math.isnan(estimate.displacement_px)
+
+
+def test_a_frame_delivered_twice_is_said_by_name() -> None:
+    frames = rendered(9.0, 770).frames.copy()
+    frames[3] = frames[2]
+    assert fit_composite(frames, PERIOD_S, EXPOSURE_S).reason == MotionReason.DUPLICATED
+
+
+@pytest.mark.parametrize("exposure_s", [None, 0.0])
+def test_a_blur_without_an_exposure_says_nothing(exposure_s: float | None) -> None:
+    frames = rendered(40.0, 780, frames=1).frames
+    assert fit_single(frames, PERIOD_S, exposure_s).reason == MotionReason.NO_EXPOSURE
+
+
+@pytest.mark.parametrize(
+    ("period_s", "exposure_s", "words"),
+    [(0.0, 0.01, "frame_period_s"), (math.nan, 0.01, "frame_period_s"), (0.03, -1.0, "exposure_s"), (0.03, 1.0, "exp")],
+)
+def test_times_that_cannot_be_are_named(period_s: float, exposure_s: float, words: str) -> None:
+    stack = np.stack([texture(64, 96, k) for k in range(3)])
+    for fit in (fit_composite, fit_single):
+        with pytest.raises(FrameError, match=words):
+            fit(stack, period_s, exposure_s)
+
+
+def test_frames_that_cannot_be_are_named() -> None:
+    frame = texture(64, 96, 0)
+    with pytest.raises(FrameError, match="at least 2 frames, got 1"):
+        fit_composite([frame], PERIOD_S, EXPOSURE_S)
+    with pytest.raises(FrameError, match="one size"):
+        fit_single([frame, frame[:40]], PERIOD_S, EXPOSURE_S)
+    with pytest.raises(FrameError, match="uint8 or uint16"):
+        fit_single([frame.astype(np.float64)], PERIOD_S, EXPOSURE_S)
+
+
+def test_small_pictures_of_any_kind_never_crash() -> None:
+    """Noise of every odd size, from the smallest that is allowed on."""
+    rng = np.random.default_rng(9)
+    for height, width in ((32, 32), (33, 47), (32, 200), (120, 32), (61, 97)):
+        frames = rng.integers(0, 200, (4, height, width)).astype(np.uint16)
+        assert not fit_composite(frames, PERIOD_S, EXPOSURE_S).accepted
+        assert not fit_single(frames[:1], PERIOD_S, EXPOSURE_S).accepted
