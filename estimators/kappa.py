@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.blurfit import blur_shapes
 from axialnav.estimators.joint import Fit
 from axialnav.estimators.spectrum import Band
-from axialnav.estimators.whittle import parabola, transfer, whittle_costs
+from axialnav.estimators.whittle import parabola, whittle_costs
 
 Array = NDArray[np.float64]
 MIN_LENGTH_PX = 2.0
@@ -30,6 +30,8 @@ LOWEST_SHARE = 0.2  # of 1 / l: below, stains and lamps spoil the power law
 MIN_GROUPS = 12
 SHAPE_STRIDE = 2
 TINY = 1e-9
+SLOPES = (1.0, 1.5, 2.0, 2.5, 3.0)
+LENS_SIGMAS_PX = (0.4, 0.8, 1.4)
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,14 @@ class Kappa:
 
 
 UNKNOWN = Kappa(math.nan, math.nan)
+
+
+@lru_cache(maxsize=8)
+def blur_shapes(band: Band) -> Array:
+    """Power laws behind Gaussian lenses, candidate spectra of texture, shape (m, f)."""
+    f = band.frequency()
+    family = [(f / f[0]) ** -a * np.exp(-((2.0 * np.pi * s * f) ** 2)) for a in SLOPES for s in LENS_SIGMAS_PX]
+    return np.array(family)
 
 
 def blur_ratio(fit: Fit, band: Band, rows: Array, exposure_ratio: float) -> Kappa:
@@ -80,7 +90,7 @@ def blur_ratio(fit: Fit, band: Band, rows: Array, exposure_ratio: float) -> Kapp
         used = values[..., first : first + count * size]
         return np.ascontiguousarray(used.reshape(*values.shape[:-1], count, size).mean(axis=-1))
 
-    tables = grouped(transfer(RATIOS * expected_px, band.frequency(), 1, 1.0))
+    tables = grouped(np.sinc(RATIOS[:, None] * expected_px * band.frequency()) ** 2)
     cost = np.empty(len(RATIOS))
     number = np.empty(len(RATIOS), dtype=np.int64)
     whittle_costs(np.maximum(grouped(power), TINY), tables, grouped(blur_shapes(band)[::SHAPE_STRIDE]), cost, number)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from importlib import import_module
-from itertools import pairwise
 
 import numpy as np
 
-from axialnav.estimators.composite import measure_composite, measure_single
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import Image, unusable
+from axialnav.estimators.frames import Image
 from axialnav.estimators.measure import JointOptions, measure_joint
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
+from axialnav.estimators.spectral import fit_composite, fit_single
+from axialnav.estimators.spectral.verdict import why_unusable
 from axialnav.estimators.window import FrameWindow
 
 BASELINES = ("stripes", "darkline", "dct", "cepstrum")
@@ -42,23 +42,19 @@ def estimate_stack(
 ) -> MotionEstimate:
     """Run one method over grey frames of one size, motion along the rows."""
     span_s = (len(stack) - 1) * frame_period_s
-    reason = next((why for why in map(unusable, stack) if why), "") or _duplicated(stack)
+    reason = why_unusable(stack)
     if reason:
         return refused(reason, signed=method == "joint", window_s=span_s, method=method)
     if method == "composite":
-        return measure_composite(stack, frame_period_s, exposure_s)
+        return fit_composite(stack, frame_period_s, exposure_s)
     if method == "single":
-        return measure_single(stack[len(stack) // 2], frame_period_s, exposure_s)
+        return fit_single([stack[len(stack) // 2]], frame_period_s, exposure_s)
     if method in BASELINES:
         return _baseline(stack, method, frame_period_s, exposure_s)
     window = FrameWindow(stack[0].shape[0], stack[0].shape[1], len(stack), stack[0].dtype)
     for image in stack:
         window.push(image)
     return measure_joint(window, JointOptions(frame_period_s, exposure_s, prior_px))
-
-
-def _duplicated(stack: list[Image]) -> str:
-    return MotionReason.DUPLICATED if any(np.array_equal(a, b) for a, b in pairwise(stack)) else ""
 
 
 def _baseline(stack: list[Image], method: str, frame_period_s: float, exposure_s: float | None) -> MotionEstimate:

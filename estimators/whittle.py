@@ -1,13 +1,12 @@
-r"""Blur from one power spectrum: Whittle's likelihood of texture times transfer plus noise.
+r"""Blur of one picture from its power spectrum: Whittle's likelihood of texture times transfer plus noise.
 
-.. math:: P(f) \approx c \, f^{-a} e^{-(2 \pi \sigma f)^2} \, T(f; d) + s, \qquad
-    T(f; d) = \mathrm{sinc}^2(f d r) \, D_N^2(f d), \quad D_N(x) = \frac{\sin \pi N x}{N \sin \pi x}
+.. math:: P(f) \approx c \, q(f) \, \mathrm{sinc}^2(f l) + s
 
-with the exposure ratio r and N frames in the mean (N = 1: one exposure).  Everything but d is nuisance: the slope a and
-the lens width come from a small family, amplitude and noise by iterated weighted least squares.
+Everything but l is nuisance: the texture q comes from a small family, amplitude and noise by iterated weighted least
+squares.
 
-Source: Whittle, J. Roy. Stat. Soc. B 15 (1953); nearest published relative: Oliveira, Figueiredo and Bioucas-Dias, IEEE
-Trans. Image Process. 23(1), 2014 (power law times sinc, fitted in the logarithm).
+Source: P. Whittle, Arkiv foer Matematik 2, 1953; nearest published relative: Oliveira, Figueiredo and Bioucas-Dias,
+IEEE Trans. Image Process. 23(1), 2014 (power law times sinc, fitted in the logarithm).
 """
 
 from __future__ import annotations
@@ -20,23 +19,6 @@ from axialnav.models.jit import kernel
 Array = NDArray[np.float64]
 PASSES = 4
 FLOOR = 1e-4
-
-
-def transfer(lengths_px: Array, frequency: Array, frames: int, exposure_ratio: float) -> Array:
-    """Power transfer of the mean of ``frames`` frames for every displacement, shape (d, f).
-
-    For one frame pass blur lengths and ``exposure_ratio = 1``.
-    """
-    phase = lengths_px[:, None] * frequency[None]
-    power = np.sinc(exposure_ratio * phase) ** 2
-    if frames > 1:
-        power *= (np.sinc(frames * phase) / _safe(np.sinc(phase))) ** 2
-    return np.asarray(power)
-
-
-def _safe(values: Array) -> Array:
-    """Zeros of the denominator of the Dirichlet kernel, where numerator and denominator vanish together."""
-    return np.where(np.abs(values) < 1e-9, 1e-9, values)
 
 
 @kernel
@@ -88,13 +70,6 @@ def whittle_costs(power: Array, transfers: Array, shapes: Array, cost: Array, be
             if value < cost[d]:
                 cost[d] = value
                 best[d] = m
-
-
-def fitted_spectrum(power: Array, transfer_power: Array, shape: Array) -> Array:
-    """Spectrum (f,) of one transfer and shape with its best amplitudes."""
-    model = np.empty_like(power)
-    amplitudes(power, shape * (transfer_power + FLOOR), model)
-    return model
 
 
 def parabola(x: Array, y: Array) -> tuple[float, float]:

@@ -6,31 +6,7 @@ import numpy as np
 import pytest
 
 from axialnav.estimators.estimate import MotionReason, estimate_motion
-from axialnav.estimators.whittle import fitted_spectrum, transfer, whittle_costs
 from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered
-
-
-def test_the_transfer_of_a_composite_is_that_of_its_frames() -> None:
-    """Oracle: the mean of N shifted and box-blurred impulses, transformed."""
-    frequency, d, frames, ratio = np.linspace(0.01, 0.45, 50), 7.3, 5, 0.3
-    shift = np.exp(-2j * np.pi * frequency[None] * d * np.arange(frames)[:, None]).mean(axis=0)
-    inside = np.linspace(-0.5, 0.5, 4001) * d * ratio
-    box = np.exp(-2j * np.pi * frequency[None] * inside[:, None]).mean(axis=0)
-    expected = np.abs(shift * box) ** 2
-    np.testing.assert_allclose(transfer(np.array([d]), frequency, frames, ratio)[0], expected, atol=5e-4)
-
-
-def test_whittles_cost_is_lowest_where_the_spectrum_was_made() -> None:
-    frequency = np.linspace(0.01, 0.45, 300)
-    shape = frequency**-2.0
-    lengths = np.arange(4.0, 12.0, 0.5)
-    tables = transfer(lengths, frequency, 1, 1.0)
-    rng = np.random.default_rng(3)
-    power = (2.0 * shape * tables[7] + 5.0) * rng.gamma(50.0, 1.0 / 50.0, 300)
-    cost = np.empty(len(lengths))
-    whittle_costs(power, tables, shape[None], cost, np.empty(len(lengths), dtype=np.int64))
-    assert int(np.argmin(cost)) == 7
-    np.testing.assert_allclose(fitted_spectrum(power, tables[7], shape), 2.0 * shape * tables[7] + 5.0, rtol=0.2)
 
 
 @pytest.mark.parametrize("displacement_px", [1.5, -6.7, 20.7, 40.0])
