@@ -131,8 +131,3 @@ def power(re: Plane, im: Plane, edges: NDArray[np.int64], out: Plane) -> None:
             a, b = re[r], im[r]
             for f in range(a.shape[0]):
                 acc[f] += a[f] * a[f] + b[f] * b[f]
-
-
-def strip_edges(rows: int, strips: int) -> NDArray[np.int64]:
-    """First row of every strip and the end, shape (strips + 1,)."""
-    return np.linspace(0, rows, strips + 1).astype(np.int64)
