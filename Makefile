@@ -17,7 +17,7 @@ help:
 	@echo "make quick         the test suite without the long statistical runs"
 	@echo "make lint          style, types and layering"
 	@echo "make docs          the documentation, into docs/_build/html"
-	@echo "make bench         accuracy on the real flights; also bench-motion, bench-fusion"
+	@echo "make bench         accuracy on the real flights; also bench-motion, bench-fusion, bench-faults"
 	@echo "make readme-check  run every command of the README in a fresh clone"
 	@echo "make clean         remove what the commands above have made, .venv included"
 
@@ -56,7 +56,7 @@ docs: $(DOCS_INSTALLED)
 	@echo "docs/_build/html/index.html"
 
 bench: bench-flights
-bench-flights bench-motion bench-fusion: bench-%: $(INSTALLED)
+bench-flights bench-motion bench-fusion bench-faults: bench-%: $(INSTALLED)
 	@$(BIN)/python -m tests.bench.bench_$*
 
 readme-check: $(INSTALLED)
