@@ -12,17 +12,25 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
 from axialnav.fusion.errors import AxialnavError, ConfigError
+from axialnav.replay.cli_check import check, compare
 from axialnav.replay.cli_output import complain, emit
 from axialnav.replay.cli_replay import demo, replay
 from axialnav.replay.motion_cli import motion_command
 
+VERBS: dict[str, Callable[..., int]] = {
+    "demo": demo,
+    "replay": replay,
+    "motion": motion_command,
+    "check": check,
+    "compare": compare,
+}
 PASSED, FAILED, USAGE, UNUSABLE, INTERRUPTED = 0, 1, 2, 3, 130
 DEBUG = "AXIALNAV_DEBUG"
 HELP = """Axial velocity of a UAV in a featureless tunnel, with an honest uncertainty.
@@ -47,7 +55,7 @@ def build_app() -> App:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    for name, verb in (("demo", demo), ("replay", replay), ("motion", motion_command)):
+    for name, verb in VERBS.items():
         app.command(verb, name=name)
     return app
 
