@@ -26,7 +26,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "cyclopts": ("replay/",),
     "pyarrow": ("replay/",),
 }
-DISTRIBUTION = {"cv2": "opencv-python-headless", "yaml": "pyyaml"}
+DISTRIBUTION = {"cv2": "opencv-python-headless", "serial": "pyserial", "yaml": "pyyaml"}
 
 
 def test_the_layers_import_only_downwards() -> None:
