@@ -15,9 +15,10 @@ from axialnav.fusion.corridor import CorridorEstimator, NotStartedError, PastSta
 from axialnav.fusion.errors import ConfigError
 from axialnav.fusion.events import Events, Table, pack_tables
 from axialnav.fusion.kernels.run import health, write_track
-from axialnav.fusion.memory import LOG_WIDTH, TRACK_FLAGS, TRACK_WIDTH, Records
+from axialnav.fusion.memory import LOG_WIDTH, TRACK_FLAGS, TRACK_WIDTH, Memory, Records
 from axialnav.fusion.outcome import AxialState, Health
 from axialnav.fusion.sources import Kind
+from axialnav.fusion.stream import SteppedStream, Stream
 
 Array = NDArray[np.float64]
 REPORTS = 50
@@ -43,8 +44,8 @@ class AxialEstimator(CorridorEstimator):
     """
 
     def __init__(self, config: Config | None = None) -> None:
+        self._filter = AxialFilter(config or Config())
         super().__init__(config)
-        self._filter = AxialFilter(self.config)
 
     def state(self, t_ns: int | None = None) -> AxialState:
         """State at ``t_ns`` (default: the newest sample that drives the filter), carried forward with that sample.
@@ -60,7 +61,7 @@ class AxialEstimator(CorridorEstimator):
             raise NotStartedError(
                 f"no state yet: the filter starts after {self.config.start.window_s:g} s of samples with an attitude"
             )
-        memory = self._memory.copy()
+        memory = self._stream.ring.memory.copy()
         newest = int(memory.core["t_imu"][0])
         now = newest if t_ns is None else int(t_ns)
         if now < newest:
@@ -73,27 +74,17 @@ class AxialEstimator(CorridorEstimator):
     def _build_settings(self) -> Records:
         return axial_settings(self.config)
 
-    def _align(self) -> bool:
-        """Find the first state once the samples that drive the filter span the first window."""
-        entries = self._history.entries
-        held = Events(
-            np.array([e.t_ns for e in entries]),
-            np.array([e.source for e in entries]),
-            np.array([e.values for e in entries]),
-        )
+    def _build_stream(self, reach_ns: int) -> Stream:
+        return SteppedStream(len(self._sources), reach_ns, self._filter.step)
+
+    def _align(self, held: Events) -> tuple[Memory, int] | None:
+        """First state and end of the first window, once the samples that drive the filter span it."""
         span_s = self._filter.span_s(held)
         if span_s is None or span_s <= self.config.start.window_s:
-            return False
-        self._memory = self._filter.start(held)
-        for entry in entries:
-            entry.before = None
+            return None
         drives = self._sources["kind"][held.source] == int(self._filter.driver)
-        self._start_ends_ns = int(held.t_ns[drives][0]) + round(self.config.start.window_s * 1e9)
-        self._aligned = True
-        return True
-
-    def _run(self, t_ns: int, source: int, values: Array) -> None:
-        self._filter.step(t_ns, source, values, self._memory, self._log[0])
+        end_ns = int(held.t_ns[drives][0]) + round(self.config.start.window_s * 1e9)
+        return self._filter.start(held), end_ns
 
 
 def run_axial(

@@ -11,10 +11,9 @@ from axialnav.fusion.alignment import align
 from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import AxialnavError, ConfigError
-from axialnav.fusion.events import WIDTH, Events
-from axialnav.fusion.history import History
+from axialnav.fusion.events import Events
 from axialnav.fusion.kernels.propagate import propagate_filter
-from axialnav.fusion.kernels.run import health, run
+from axialnav.fusion.kernels.run import health
 from axialnav.fusion.kernels.update import MIN_WEIGHT
 from axialnav.fusion.memory import (
     LOG_CODE,
@@ -23,8 +22,6 @@ from axialnav.fusion.memory import (
     LOG_NIS,
     LOG_VARIANCE,
     LOG_WEIGHT,
-    LOG_WIDTH,
-    TRACK_WIDTH,
     Memory,
     build_settings,
     new_memory,
@@ -32,8 +29,9 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
 from axialnav.fusion.packing import Packer
-from axialnav.fusion.readings import CameraFrame, Reading
+from axialnav.fusion.readings import CameraFrame, ImuSample, Reading
 from axialnav.fusion.sources import Kind, Records, build_sources
+from axialnav.fusion.stream import HELD, TOO_OLD, CompiledStream, Stream
 from axialnav.models.state import (
     ACCEL_BIAS,
     BLUR_SCALE,
@@ -48,6 +46,8 @@ from axialnav.models.state import (
 )
 
 Array = NDArray[np.float64]
+FUSED = (Verdict.FUSED, Reason.NONE)
+GATED = (Verdict.GATED, Reason.INNOVATION)
 
 
 class NotStartedError(AxialnavError):
@@ -88,17 +88,12 @@ class CorridorEstimator:
         self._packer = Packer(self.config)
         self._cameras = CameraFeed(self.config)
         self._sources = build_sources(self.config)
-        self._settings = self._build_settings()
-        # plain lists and one-event buffers: indexing records and making arrays would cost more than the filter itself
-        self._is_imu: list[bool] = (self._sources["kind"] == int(Kind.IMU)).tolist()
+        # a plain list: indexing records would cost more than the filter itself
         self._enabled: list[bool] = self._sources["enabled"].tolist()
-        self._event = Events(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, WIDTH)))
+        self._settings = self._build_settings()
         self._scratch = new_scratch()
-        self._memory = new_memory(len(self._sources))
-        self._history = History(reach_ns=round(self.config.delay.buffer_s * 1e9))
+        self._stream = self._build_stream(round(self.config.delay.buffer_s * 1e9))
         self._aligned = False
-        self._start_ends_ns = -(2**62)
-        self._track, self._log = np.zeros((1, TRACK_WIDTH)), np.zeros((1, LOG_WIDTH))
         self.late: Counter[str] = Counter()
 
     def push(self, reading: Reading) -> Outcome:
@@ -119,24 +114,13 @@ class CorridorEstimator:
         source, values = self._packer.pack(reading)
         if not self._enabled[source]:
             return self._record(reading, Reason.DISABLED)
-        in_first_window = reading.t_ns <= self._start_ends_ns
-        if self._aligned and (not self._history.can_hold(reading.t_ns) or (in_first_window and self._history.trimmed)):
+        code = self._stream.push(reading.t_ns, source, values)
+        if code == TOO_OLD:
             self.late[reading.sensor] += 1
             return self._record(reading, Reason.TOO_OLD)
-        index = self._history.insert(reading.t_ns, source, values)
-        if in_first_window:
-            self._aligned = False  # the first window has changed: start again from it
-        if not self._aligned:
-            if not self._align():
-                return self._record(reading, Reason.ALIGNING)
-            self._run_from(0, index)
-        elif index == len(self._history.entries) - 1:
-            self._run_from(index, index)
-        else:
-            start, self._memory = self._history.rewind(index)
-            self._run_from(start, index)
-        self._history.forget(self._start_ends_ns)
-        return self._record(reading, Reason.NONE) if self._is_imu[source] else self._record_update(reading)
+        if code == HELD and not self._start():
+            return self._record(reading, Reason.ALIGNING)
+        return Outcome(reading.t_ns, reading.sensor) if type(reading) is ImuSample else self._record_update(reading)
 
     def state(self, t_ns: int | None = None) -> AxialState:
         """State at ``t_ns`` (default: the newest inertial sample), carried forward with the last sample.
@@ -152,7 +136,7 @@ class CorridorEstimator:
             raise NotStartedError(
                 f"no state yet: the filter starts after {self.config.start.window_s:g} s of inertial samples"
             )
-        memory = self._memory.copy()
+        memory = self._stream.ring.memory.copy()
         core = memory.core[0]
         newest = int(core["t_imu"])
         now = newest if t_ns is None else int(t_ns)
@@ -171,66 +155,48 @@ class CorridorEstimator:
     def _build_settings(self) -> Records:
         return build_settings(self.config)
 
-    def _align(self) -> bool:
-        """Find the first state once inertial samples span the first window; all events are then waiting to be run."""
-        entries = self._history.entries
-        window_ns = round(self.config.start.window_s * 1e9)
-        if entries[-1].t_ns <= entries[0].t_ns + window_ns:
+    def _build_stream(self, reach_ns: int) -> Stream:
+        return CompiledStream(self._sources, self._settings, reach_ns)
+
+    def _start(self) -> bool:
+        """Find the first state, anew if the first window has changed, and run all that is held; whether it is found."""
+        found = self._align(self._stream.ring.events)
+        self._aligned = found is not None
+        if found is None:
+            self._stream.hold()
             return False
-        imu = [e.t_ns for e in entries if self._is_imu[e.source]]
-        if not imu or imu[-1] <= imu[0] + window_ns:
-            return False
-        held = Events(
-            np.array([e.t_ns for e in entries]),
-            np.array([e.source for e in entries]),
-            np.array([e.values for e in entries]),
-        )
-        self._memory = new_memory(len(self._sources))
-        align(self.config, self._sources, held, self._memory)
-        for entry in entries:
-            entry.before = None
-        self._start_ends_ns = imu[0] + window_ns
-        self._aligned = True
+        self._stream.restart(*found)
         return True
 
-    def _run_from(self, start: int, wanted: int) -> None:
-        """Process the events from ``start`` on; the log row of the one at ``wanted`` is left in ``self._log``."""
-        row = np.zeros(LOG_WIDTH)
-        for at, entry in enumerate(self._history.entries[start:], start):
-            self._history.remember(at, self._memory)
-            self._run(entry.t_ns, entry.source, entry.values)
-            if at == wanted:
-                row[:] = self._log[0]
-        self._log[0] = row
-
-    def _run(self, t_ns: int, source: int, values: Array) -> None:
-        self._log[:] = 0.0
-        self._event.t_ns[0], self._event.source[0], self._event.values[0] = t_ns, source, values
-        run(
-            *self._event, self._sources, self._memory.core, self._memory.sources, self._scratch, self._settings,
-            self._track, self._log,
-        )  # fmt: skip
+    def _align(self, held: Events) -> tuple[Memory, int] | None:
+        """First state and end of the first window, once inertial samples span it."""
+        window_ns = round(self.config.start.window_s * 1e9)
+        if held.t_ns[-1] <= held.t_ns[0] + window_ns:
+            return None
+        imu = held.t_ns[self._sources["kind"][held.source] == int(Kind.IMU)]
+        if not len(imu) or imu[-1] <= imu[0] + window_ns:
+            return None
+        memory = new_memory(len(self._sources))
+        align(self.config, self._sources, held, memory)
+        return memory, int(imu[0]) + window_ns
 
     def _record(self, reading: Reading, reason: Reason) -> Outcome:
         return Outcome(reading.t_ns, reading.sensor, verdict_of(reason), reason)
 
     def _record_update(self, reading: Reading) -> Outcome:
-        row = self._log[0]
+        row = self._stream.row
         code = int(row[LOG_CODE])
         if code < 0:
             return self._record(reading, Reason(-code))
-        fused = row[LOG_WEIGHT] > MIN_WEIGHT
-        return Outcome(
-            reading.t_ns,
-            reading.sensor,
-            Verdict.FUSED if fused else Verdict.GATED,
-            Reason.NONE if fused else Reason.INNOVATION,
-            innovation=tuple(row[LOG_INNOVATION : LOG_INNOVATION + code].tolist()),
-            variance=tuple(row[LOG_VARIANCE : LOG_VARIANCE + code].tolist()),
-            nis=float(row[LOG_NIS]),
-            gate=float(row[LOG_GATE]),
-            weight=float(row[LOG_WEIGHT]),
-        )
+        verdict, reason = FUSED if row[LOG_WEIGHT] > MIN_WEIGHT else GATED
+        if code == 1:  # spelled out for speed: most readings are scalars
+            innovation: tuple[float, ...] = (row[LOG_INNOVATION],)
+            variance: tuple[float, ...] = (row[LOG_VARIANCE],)
+        else:
+            innovation = tuple(row[LOG_INNOVATION : LOG_INNOVATION + code])
+            variance = tuple(row[LOG_VARIANCE : LOG_VARIANCE + code])
+        nis, gate, weight = row[LOG_NIS], row[LOG_GATE], row[LOG_WEIGHT]
+        return Outcome(reading.t_ns, reading.sensor, verdict, reason, innovation, variance, nis, gate, weight)
 
     def _axial_state(self, t_ns: int, memory: Memory, flags: Health) -> AxialState:
         x, P = memory.core["x"][0, 0], memory.core["P"][0, 0]

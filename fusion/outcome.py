@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,8 +74,7 @@ class Health(IntFlag):
     POSITION_RESET = 32
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(msgspec.Struct, frozen=True, gc=False):
     """Record of one reading.
 
     Attributes
@@ -97,8 +97,8 @@ class Outcome:
 
     t_ns: int
     sensor: str
-    verdict: Verdict
-    reason: Reason
+    verdict: Verdict = Verdict.FUSED
+    reason: Reason = Reason.NONE
     innovation: tuple[float, ...] = ()
     variance: tuple[float, ...] = ()
     nis: float = float("nan")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import nan
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ReadingError
-from axialnav.fusion.events import WIDTH
 from axialnav.fusion.readings import (
     Attitude,
     BlurLength,
@@ -25,85 +23,104 @@ from axialnav.fusion.readings import (
 from axialnav.fusion.sources import Kind, fused_sensors, kind_of
 from axialnav.models.rig import Uwb
 
-KIND_OF_READING: dict[type[Reading], Kind] = {
-    ImuSample: Kind.IMU,
-    PixelMotion: Kind.FLOW,
-    BlurLength: Kind.BLUR,
-    WallRange: Kind.RANGE,
-    UwbRange: Kind.UWB_RANGE,
-    UwbTdoa: Kind.UWB_TDOA,
-    UwbFix: Kind.UWB_POSITION,
-    Height: Kind.HEIGHT,
-    Attitude: Kind.ATTITUDE,
+Row = tuple[float, ...]
+
+
+def _or_nan(value: float | None) -> float:
+    return nan if value is None else value
+
+
+def _imu(r: ImuSample) -> Row:
+    return (*r.gyro_rad_s, *r.accel_m_s2, nan, nan)
+
+
+def _pixel_motion(r: PixelMotion) -> Row:
+    return (r.window_s, r.dx_px, _or_nan(r.dy_px), _or_nan(r.sigma_px), _or_nan(r.quality), nan, nan, nan)
+
+
+def _blur_length(r: BlurLength) -> Row:
+    return (r.window_s, r.length_px, r.sigma_px, nan, nan, nan, nan, nan)
+
+
+def _wall_range(r: WallRange) -> Row:
+    return (r.range_m, _or_nan(r.sigma_m), nan, nan, nan, nan, nan, nan)
+
+
+def _fix(r: UwbFix) -> Row:
+    return (*r.position_m, *(r.sigma_m or (nan, nan, nan)), nan, nan)
+
+
+def _height(r: Height) -> Row:
+    return (r.height_m, _or_nan(r.sigma_m), nan, nan, nan, nan, nan, nan)
+
+
+def _attitude(r: Attitude) -> Row:
+    return (r.roll_rad, r.pitch_rad, r.yaw_rad, _or_nan(r.sigma_rad), nan, nan, nan, nan)
+
+
+def _range_packer(anchors: dict[str, int]) -> Callable[[UwbRange], Row]:
+    def pack(r: UwbRange) -> Row:
+        powers = _or_nan(r.rssi_dbm), _or_nan(r.first_path_dbm)
+        return (anchors.get(r.anchor, -1), r.range_m, _or_nan(r.sigma_m), *powers, nan, nan, nan)
+
+    return pack
+
+
+def _tdoa_packer(anchors: dict[str, int]) -> Callable[[UwbTdoa], Row]:
+    def pack(r: UwbTdoa) -> Row:
+        pair = anchors.get(r.anchor_a, -1), anchors.get(r.anchor_b, -1)
+        return (*pair, r.difference_m, _or_nan(r.sigma_m), nan, nan, nan, nan)
+
+    return pack
+
+
+PACKERS: dict[Kind, tuple[type[Reading], Callable[[Any], Row]]] = {
+    Kind.IMU: (ImuSample, _imu),
+    Kind.FLOW: (PixelMotion, _pixel_motion),
+    Kind.BLUR: (BlurLength, _blur_length),
+    Kind.RANGE: (WallRange, _wall_range),
+    Kind.UWB_POSITION: (UwbFix, _fix),
+    Kind.HEIGHT: (Height, _height),
+    Kind.ATTITUDE: (Attitude, _attitude),
 }
-
-
-_NOT_GIVEN = (nan,) * WIDTH
 
 
 class Packer:
     """Turns typed readings of the configured sensors into event rows."""
 
     def __init__(self, config: Config) -> None:
-        names = fused_sensors(config)
-        self._sources = {name: index for index, name in enumerate(names)}
-        self._kinds = {name: kind_of(config.sensor[name]) for name in names}
-        self._anchors: dict[str, dict[str, int]] = {}
-        for name in names:
-            spec = config.sensor[name]
-            if isinstance(spec, Uwb):
-                self._anchors[name] = {anchor: index for index, anchor in enumerate(spec.anchors)}
+        # one look-up a reading: by sensor name, to the source, the type it gives and how that is packed
+        self._sources: dict[str, tuple[int, type[Reading], Callable[[Any], Row]]] = {}
+        for index, name in enumerate(fused_sensors(config)):
+            spec, kind = config.sensor[name], kind_of(config.sensor[name])
+            assert kind is not None
+            if isinstance(spec, Uwb) and kind != Kind.UWB_POSITION:
+                anchors = {anchor: number for number, anchor in enumerate(spec.anchors)}
+                is_range = kind == Kind.UWB_RANGE
+                self._sources[name] = (
+                    (index, UwbRange, _range_packer(anchors)) if is_range else (index, UwbTdoa, _tdoa_packer(anchors))
+                )
+            else:
+                self._sources[name] = (index, *PACKERS[kind])
 
-    def pack(self, reading: Reading) -> tuple[int, NDArray[np.float64]]:
-        """Source index and values (8,) of a reading.
+    def pack(self, reading: Reading) -> tuple[int, Row]:
+        """Source index and the ``WIDTH`` values of a reading.
 
         Raises
         ------
         ReadingError
             The sensor is not configured, or it is not one that gives such readings.
         """
-        name = reading.sensor
-        if name not in self._sources:
+        found = self._sources.get(reading.sensor)
+        if found is None:
             raise ReadingError(
-                f"no sensor named {name!r} is configured; there are {', '.join(self._sources) or 'none'}; "
-                f"describe it as [sensor.{name}]"
+                f"no sensor named {reading.sensor!r} is configured; there are {', '.join(self._sources) or 'none'}; "
+                f"describe it as [sensor.{reading.sensor}]"
             )
-        kind = KIND_OF_READING.get(type(reading))
-        if kind is not self._kinds[name]:
-            expected = self._kinds[name]
+        source, expected, values = found
+        if type(reading) is not expected:
             raise ReadingError(
-                f"{type(reading).__name__} from {name}, which is configured as a source of "
-                f"{expected.name if expected is not None else 'nothing'}; send it under another sensor name"
+                f"{type(reading).__name__} from {reading.sensor}, which is configured as a source of "
+                f"{expected.__name__}; send it under another sensor name"
             )
-        values = self._values(reading)
-        return self._sources[name], np.array(values + _NOT_GIVEN[len(values) :])
-
-    def _values(self, reading: Reading) -> tuple[float, ...]:
-        match reading:
-            case ImuSample(gyro_rad_s=gyro, accel_m_s2=accel):
-                return (*gyro, *accel)
-            case UwbTdoa(anchor_a=a, anchor_b=b, difference_m=difference, sigma_m=sigma):
-                index = self._anchors[reading.sensor]
-                return (index.get(a, -1), index.get(b, -1), difference, _or_nan(sigma))
-            case UwbRange(anchor=anchor, range_m=range_m, sigma_m=sigma):
-                number = self._anchors[reading.sensor].get(anchor, -1)
-                powers = _or_nan(reading.rssi_dbm), _or_nan(reading.first_path_dbm)
-                return (number, range_m, _or_nan(sigma), *powers)
-            case PixelMotion(window_s=window, dx_px=dx, dy_px=dy):
-                return (window, dx, _or_nan(dy), _or_nan(reading.sigma_px), _or_nan(reading.quality))
-            case WallRange(range_m=range_m, sigma_m=sigma):
-                return (range_m, _or_nan(sigma))
-            case BlurLength(window_s=window, length_px=length, sigma_px=sigma):
-                return (window, length, sigma)
-            case UwbFix(position_m=position, sigma_m=sigmas):
-                return (*position, *(sigmas or (nan, nan, nan)))
-            case Height(height_m=height, sigma_m=sigma):
-                return (height, _or_nan(sigma))
-            case Attitude(roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw, sigma_rad=sigma):
-                return (roll, pitch, yaw, _or_nan(sigma))
-            case _:
-                raise ReadingError(f"{type(reading).__name__} is not a reading that the filter takes")
-
-
-def _or_nan(value: float | None) -> float:
-    return nan if value is None else value
+        return source, values(reading)

@@ -14,6 +14,7 @@ from axialnav.fusion.corridor import CorridorEstimator, NotStartedError
 from axialnav.fusion.errors import ReadingError
 from axialnav.fusion.outcome import AxialState, Health, Reason, Verdict
 from axialnav.fusion.readings import Height, ImuSample, Reading, UwbFix, UwbRange, WallRange
+from axialnav.fusion.ring import CAPACITY
 from tests.fusion.inside import memories
 from tests.fusion.made_flights import START_NS, MadeFlight, Scene, fly
 from tests.fusion.made_readings import counts, readings
@@ -142,6 +143,16 @@ def test_the_ring_reaches_as_far_as_it_is_told() -> None:
         assert (outcome.verdict is Verdict.LATE) == late
 
 
+def test_a_ring_that_must_grow_loses_nothing() -> None:
+    """A reach of 6 s holds more events than the ring starts with, and snapshots must survive the growth."""
+    made = flight(8.0)
+    config = made.config.with_params({"delay.buffer_s": "6"})
+    stream = readings(made)
+    assert len(stream) > 2 * CAPACITY
+    expected = bits(pushed(config, stream).state())
+    assert bits(pushed(config, late_order(stream, 3.0, seed=3)).state()) == expected
+
+
 def test_before_the_first_window_is_full_there_is_no_state() -> None:
     made = flight()
     estimator = CorridorEstimator(made.config)
@@ -190,7 +201,7 @@ def test_a_reading_of_an_unknown_sensor_or_of_the_wrong_kind_is_an_error() -> No
         ReadingError, match=r"no sensor named 'uwb7' is configured; there are imu0, range0.*\[sensor.uwb7\]"
     ):
         estimator.push(UwbRange(t_ns=0, sensor="uwb7", anchor="a0", range_m=1.0))
-    with pytest.raises(ReadingError, match="WallRange from tdoa0, which is configured as a source of UWB_TDOA"):
+    with pytest.raises(ReadingError, match="WallRange from tdoa0, which is configured as a source of UwbTdoa"):
         estimator.push(WallRange(t_ns=0, sensor="tdoa0", range_m=1.0))
 
 
