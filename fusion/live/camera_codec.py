@@ -1,0 +1,61 @@
+"""Camera frames to compressed pictures and back, without loss unless it is asked for."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.errors import FlightError
+from axialnav.fusion.readings import CameraFrame
+
+PictureFormat = Literal["png", "jpeg"]
+FAST_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
+JPEG_QUALITY = 95
+
+
+class PictureEncoder:
+    """Compresses frames.
+
+    Parameters
+    ----------
+    form
+        ``"png"`` keeps every bit, so that a flight replays to the same digest; ``"jpeg"`` is smaller and does not.
+    """
+
+    def __init__(self, form: PictureFormat = "png") -> None:
+        self._form = form
+        self._options = FAST_PNG if form == "png" else [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+
+    def __call__(self, frame: CameraFrame) -> tuple[str, bytes]:
+        """Format and bytes of a picture.
+
+        Raises
+        ------
+        ValueError
+            A picture that the format cannot hold.
+        """
+        image = np.ascontiguousarray(frame.image)
+        try:
+            done, data = cv2.imencode(f".{self._form}", image, self._options)
+        except cv2.error as error:
+            raise ValueError(f"a picture of {image.dtype} {image.shape} is no {self._form}") from error
+        if not done:
+            raise ValueError(f"a picture of {image.dtype} {image.shape} is no {self._form}")
+        return self._form, data.tobytes()
+
+
+def decode_picture(data: bytes, where: str) -> NDArray[np.generic]:
+    """Picture from its compressed bytes, as it was before.
+
+    Raises
+    ------
+    FlightError
+        No picture.
+    """
+    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise FlightError(f"{where}: a picture of {len(data)} bytes cannot be decoded; leave the camera out")
+    return np.asarray(image)
