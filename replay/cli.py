@@ -22,10 +22,12 @@ from axialnav.fusion.errors import AxialnavError, ConfigError
 from axialnav.replay.cli_check import check, compare
 from axialnav.replay.cli_output import complain, emit
 from axialnav.replay.cli_replay import demo, replay
+from axialnav.replay.cli_simulate import simulate
 from axialnav.replay.motion_cli import motion_command
 
 VERBS: dict[str, Callable[..., int]] = {
     "demo": demo,
+    "simulate": simulate,
     "replay": replay,
     "motion": motion_command,
     "check": check,

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.errors import ConfigError
 from axialnav.replay.simulate.exposure import row_delays
-from axialnav.replay.simulate.kernels import expose_plane
 from axialnav.replay.simulate.optics import lens_taps, row_taps
 from axialnav.replay.simulate.scene import CameraModel
 from axialnav.replay.simulate.walls import OVERSAMPLING, Image, Wall
@@ -120,34 +119,81 @@ class WallPlane:
         return np.vstack([rows, ray[2]])
 
 
-def posed_light(plane: WallPlane, camera: CameraModel, poses: Poses) -> Image:
-    """Relative light on the sensor while the shutter is open, 1 = mean of the wall, shape (h, w).
+@dataclass(frozen=True)
+class Window:
+    """Part of a picture [px]: left and top corner, width and height."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+
+def posed_light(
+    plane: WallPlane,
+    camera: CameraModel,
+    poses: Poses,
+    window: Window | None = None,
+    extent_px: tuple[Array, Array] | None = None,
+) -> Image:
+    """Relative light on the sensor while the shutter is open, 1 = mean of the wall.
 
     Parameters
     ----------
     plane
-        The wall in view; it must fill the picture.
+        The wall in view; it must fill the window.
     camera
         Size, focal length, exposure, readout and lens; its distortion is not applied.
     poses
         Where the camera is around the middle of the exposure.
+    window
+        Part of the picture to make; None for all of it.
+    extent_px
+        Lowest and highest point of the wall that matter [px of the wall], (2,) each; beyond them its rim repeats.
+        None: all that the window sees.
+
+    Returns
+    -------
+    ndarray, float32, shape (height, width) of the window
 
     Raises
     ------
     ConfigError
         If the camera is behind the wall or looks past it.
     """
-    raw = np.empty((camera.height, OVERSAMPLING * camera.width), dtype=np.float32)
+    window = window or Window(0, 0, camera.width, camera.height)
+    bands = _bands(camera, window)
     delays = row_delays(camera.height, camera.readout_s)
-    step = ROWS_TOGETHER if camera.readout_s > 0.0 else camera.height
-    bounds = [slice(first, min(first + step, camera.height)) for first in range(0, camera.height, step)]
-    exposures = [_exposure(plane, camera, poses, float(delays[rows].mean())) for rows in bounds]
-    rims = np.vstack([_rim(maps, camera, rows) for (maps, _), rows in zip(exposures, bounds, strict=True)])
-    light, start = plane.view(rims.min(axis=0), rims.max(axis=0))
+    exposures = [_exposure(plane, camera, poses, float(delays[band].mean())) for band in bands]
+    if extent_px is None:
+        rims = [_rim(maps, window, band) for (maps, _), band in zip(exposures, bands, strict=True)]
+        extent_px = np.min([r.min(axis=0) for r in rims], axis=0), np.max([r.max(axis=0) for r in rims], axis=0)
+    light, start = plane.view(*extent_px)
     to_sample = np.array([[OVERSAMPLING, 0.0, -OVERSAMPLING * start[0]], [0.0, 1.0, -start[1]], [0.0, 0.0, 1.0]])
-    for rows, (maps, weights) in zip(bounds, exposures, strict=True):
-        expose_plane(light, to_sample @ maps, weights, rows.start, OVERSAMPLING, raw[rows])
+    raw = np.empty((window.height, OVERSAMPLING * window.width), dtype=np.float32)
+    for band, (maps, weights) in zip(bands, exposures, strict=True):
+        to_pixel = np.array([[1.0 / OVERSAMPLING, 0.0, window.left], [0.0, 1.0, band.start], [0.0, 0.0, 1.0]])
+        _expose(light, to_sample @ maps @ to_pixel, weights, raw[band.start - window.top : band.stop - window.top])
     return _decimated(raw, row_taps(camera.lens_sigma_px, OVERSAMPLING), _column(camera))
+
+
+def _bands(camera: CameraModel, window: Window) -> list[slice]:
+    """Rows that are exposed together."""
+    step = ROWS_TOGETHER if camera.readout_s > 0.0 else window.height
+    bottom = window.top + window.height
+    return [slice(first, min(first + step, bottom)) for first in range(window.top, bottom, step)]
+
+
+def _expose(light: Image, maps: Array, weights: NDArray[np.float32], out: Image) -> None:
+    """Weighted sum of a plane picture over several homographies, bilinear between its samples."""
+    size = (out.shape[1], out.shape[0])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    out[:] = 0.0
+    for matrix, weight in zip(maps, weights.tolist(), strict=True):
+        seen = cv2.warpPerspective(
+            light, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE, hint=cv2.ALGO_HINT_ACCURATE
+        )
+        cv2.scaleAdd(seen, weight, out, out)
 
 
 def _decimated(raw: Image, taps: NDArray[np.float32], column: NDArray[np.float32]) -> Image:
@@ -174,9 +220,10 @@ def _exposure(plane: WallPlane, camera: CameraModel, poses: Poses, delay_s: floa
     return maps, np.asarray(0.5 * weights, dtype=np.float32)
 
 
-def _rim(maps: Array, camera: CameraModel, rows: slice) -> Array:
-    """Where the corners of some rows of the picture lie on the wall during the exposure [px], shape (4 m, 2)."""
-    corners = np.array([[u, v, 1.0] for u in (0, camera.width) for v in (rows.start, rows.stop)])
+def _rim(maps: Array, window: Window, band: slice) -> Array:
+    """Where the corners of some rows of a window lie on the wall during the exposure [px], shape (4 m, 2)."""
+    left, right = window.left, window.left + window.width
+    corners = np.array([[u, v, 1.0] for u in (left, right) for v in (band.start, band.stop)])
     seen = (maps @ corners.T).swapaxes(1, 2).reshape(-1, 3)
     if not float(seen[:, 2].min()) > 0.0:
         raise ConfigError("the camera looks past the end of the wall; turn it towards the wall or narrow its view")

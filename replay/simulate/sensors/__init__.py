@@ -1,0 +1,1 @@
+"""What the sensors read on a simulated flight; each module draws one kind from the truth."""
