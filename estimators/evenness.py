@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.extra import extra_step
 from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
-from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.positions import free_positions, motion_basis
 from axialnav.estimators.spectrum import pair_frames
 
 Array = NDArray[np.float64]
@@ -50,11 +51,13 @@ def bend_significance(fit: Fit) -> float:
     if frames < 3 or len(fit.motion) != 1:
         return 0.0
     basis = motion_basis(frames, True)
-    J = basis.T @ fit.information.sum(axis=0) @ basis
-    g = basis.T @ fit.score.sum(axis=0)
-    bend = g[1] - J[1, 0] / J[0, 0] * g[0]
-    room = J[1, 1] - J[1, 0] ** 2 / J[0, 0]
-    return float(bend**2 / (room * WINDOW_VARIANCE)) if room > 0.0 else 0.0
+    chi2 = _chi2(fit, np.ascontiguousarray(basis[:, :1]), np.ascontiguousarray(basis[:, 1:]))[0]
+    return max(chi2, 0.0) / WINDOW_VARIANCE
+
+
+def _chi2(fit: Fit, known: Array, extra: Array) -> tuple[float, Array]:
+    step = np.zeros(extra.shape[1])
+    return extra_step(fit.score, fit.information, np.ones(len(fit.score)), known, extra, step), step
 
 
 def residual(fit: Fit) -> Residual:
@@ -63,16 +66,10 @@ def residual(fit: Fit) -> Residual:
     dof = frames - 1 - fitted
     if dof < 1:
         return Residual(0.0, 0, 0.0)
-    known = np.column_stack([np.ones(frames), motion_basis(frames, fitted == 2)])
-    free = np.linalg.svd(known.T)[2][known.shape[1] :].T
-    whole = np.column_stack([known[:, 1:], free])
-    J = whole.T @ fit.information.sum(axis=0) @ whole
-    if float(np.linalg.eigvalsh(J)[0]) <= 0.0:
+    chi2, step = _chi2(fit, motion_basis(frames, fitted == 2), free_positions(frames, fitted))
+    if chi2 < 0.0:
         return Residual(np.inf, dof, np.inf)
-    covariance = np.linalg.inv(J)
-    step = (covariance @ (whole.T @ fit.score.sum(axis=0)))[fitted:]
-    chi2 = float(step @ np.linalg.solve(covariance[fitted:, fitted:], step)) / WINDOW_VARIANCE
-    return Residual(chi2, dof, float(np.sqrt(step @ step / dof)))
+    return Residual(chi2 / WINDOW_VARIANCE, dof, float(np.sqrt(step @ step / dof)))
 
 
 def uneven(fit: Fit, left: Residual) -> bool:

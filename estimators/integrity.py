@@ -54,26 +54,20 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
     noise and is far more likely; a band without texture opposes nothing.  The candidate with the fewest opponents
     wins, then the most likely one.
     """
-    gain, grid = profiles.gain, profiles.grid_px
+    gain = profiles.gain
     bands = gain.shape[0]
     if not every_band:
         everyone = np.ones(bands, dtype=np.bool_)
         return Choice(int(np.argmax(gain.sum(axis=0))), everyone, ~everyone)
-    best = gain.max(axis=1)
+    peaks = gain.argmax(axis=1)
+    best = gain[np.arange(bands), peaks]
     sure = best > SURE * profiles.spread
-    candidates = {
-        int(np.argmax(gain.sum(axis=0))),
-        *(int(i) for i, s in zip(gain.argmax(axis=1), sure, strict=True) if s),
-    }
+    candidates = {int(np.argmax(gain.sum(axis=0))), *peaks[sure].tolist()}
     choices = []
     for candidate in candidates:
-        near = np.abs(grid - grid[candidate]) <= REACH_PX
+        near = profiles.near(candidate, REACH_PX)
         opposed = sure & ((best - gain[:, near].max(axis=1)) / SOFTENING > OPPOSED)
-        place = (
-            int(np.flatnonzero(near)[np.argmax(gain[~opposed][:, near].sum(axis=0))])
-            if not opposed.all()
-            else candidate
-        )
+        place = near.start + int(np.argmax(gain[~opposed, near].sum(axis=0))) if not opposed.all() else candidate
         likelihood = float(gain[~opposed, place].sum())
         choices.append((int(opposed.sum()), -likelihood, place, opposed))
     _, _, place, opposed = min(choices, key=lambda choice: choice[:2])
@@ -87,13 +81,20 @@ def quarrelling(fit: Fit, products: Products) -> Mask:
     little uneven everywhere loses none.
     """
     basis = motion_basis(fit.score.shape[1], len(fit.motion) == 2)[:, 0]
-    own = np.einsum("i,sij,j->s", basis, fit.information, basis)
-    step = (fit.score @ basis) / np.maximum(own, TINY)
-    apart = np.abs(step - np.median(step))
-    deviation = apart * np.sqrt(np.maximum(own, TINY) / WINDOW_VARIANCE)
-    usual = float(np.clip(np.median(deviation) / MEDIAN_OF_NORMAL, 1.0, MAX_USUAL))
+    own = (fit.information @ basis) @ basis
+    positive = np.maximum(own, TINY)
+    step = (fit.score @ basis) / positive
+    apart = np.abs(step - middle(step))
+    deviation = apart * np.sqrt(positive / WINDOW_VARIANCE)
+    usual = min(max(middle(deviation) / MEDIAN_OF_NORMAL, 1.0), MAX_USUAL)
     tolerated = min(TOLERATED_PX, TOLERATED_SHARE * abs(float(fit.motion[0])) + TOLERATED_LEAST_PX)
     return np.asarray(((deviation > FAR * usual) & (apart > tolerated)) | (own <= 0.0))
+
+
+def middle(values: Array) -> float:
+    """Median of a few numbers (n,), without the overhead of numpy's."""
+    ordered: list[float] = sorted(values.tolist())
+    return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
 
 
 def disturbed(fit: Fit, products: Products) -> Mask:
@@ -103,13 +104,13 @@ def disturbed(fit: Fit, products: Products) -> Mask:
     it costs less left out than carried along.
     """
     frames = products.frames
-    whole = np.einsum("scf,cf->s", products.power, fit.weight)
+    whole = products.power.reshape(len(products.power), -1) @ fit.weight.ravel().astype(np.float32)
     moving = whole + 2.0 * fit.coherence.sum(axis=1)
     rows = products.rows.sum(axis=1)
     alien = (whole - moving / frames) / (frames - 1) / rows
     texture = (moving - whole) / (frames * (frames - 1)) / rows
     order = np.argsort(alien)
-    usual = float(np.median(alien[order[: (len(alien) + 1) // 2 + 1]]))
+    usual = middle(alien[order[: (len(alien) + 1) // 2 + 1]])
     bad = (alien > MAX_ALIEN * usual) & (alien - usual > MAX_ALIEN_SHARE * texture)
     bad[order[: len(alien) - MAX_LOST_STRIPS]] = False
     return np.asarray(bad)

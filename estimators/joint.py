@@ -16,19 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.positions import coherent_power, motion_basis, position_scores
+from axialnav.estimators.positions import climb, coherent_power, motion_basis, position_scores
 from axialnav.estimators.products import Products
-from axialnav.estimators.spectrum import Band, pair_count
-from axialnav.estimators.texture import blur_power, matched_weight, shape_family, smooth_noise, texture_power
+from axialnav.estimators.spectrum import pair_count
+from axialnav.estimators.texture import blur_power, group_starts, matched_weight, shape_family, smooth_spectra
 
 Array = NDArray[np.float64]
-Plane = NDArray[np.float32]
-MAX_STEP_PX = 0.3
-STEPS = 4
-TOLERANCE_PX = 1e-4
+LIMITS = np.array([0.3, 1e-4, 4.0])  # longest Newton step and the one that ends the climb [px], number of steps
 PRIOR_DOF = 6.0
 BENDS_PX = tuple(0.125 * k for k in range(-16, 17))
-NOISE_FLOOR, TINY = 1e-3, 1e-12
 WINDOW_VARIANCE = 1.6
 
 
@@ -63,31 +59,22 @@ class Fit:
     coherent: Array
 
 
-def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[Array, Array, Array]:
-    """Smooth texture, smooth noise and raw coherent power per row and frame at these positions, shape (c, f) each."""
-    frames, rows, band = products.frames, products.rows.sum(axis=0), products.band
-    omega = 2.0 * np.pi * band.frequency()
+def spectra_at(products: Products, position_px: Array, blur_px: float) -> Array:
+    """Smooth texture, smooth noise and raw coherent power per row and frame at these positions, shape (3, c, f)."""
+    band, sums = products.band, products.total
     shapes = shape_family(band.first, band.count, band.length) * blur_power(blur_px, band.frequency())
-    re, im, power = products.re.sum(axis=0), products.im.sum(axis=0), products.power.sum(axis=0, dtype=np.float64)
-    pairs = np.empty_like(power)
-    coherent_power(re, im, omega, position_px, pairs)
-    texture, noise, coherent_part = np.empty_like(power), np.empty_like(power), np.empty_like(power)
-    for c in range(len(rows)):
-        mean_power = power[c] / (frames * rows[c])
-        coherent = mean_power / frames + 2.0 * pairs[c] / (frames**2 * rows[c])
-        incoherent = (mean_power - coherent) * frames / (frames - 1)
-        noise[c] = smooth_noise(incoherent, NOISE_FLOOR * float(mean_power.mean()) + TINY)
-        coherent_part[c] = coherent - noise[c] / frames
-        texture[c] = texture_power(coherent, noise[c] / frames, int(rows[c]), shapes)
-    return texture, noise, coherent_part
+    pairs, out = np.empty(sums.power.shape), np.empty((3, *sums.power.shape))
+    coherent_power(sums.re, sums.im, band.omega(), position_px, pairs)
+    smooth_spectra(sums.power, pairs, sums.rows, products.frames, shapes, group_starts(band.count), out)
+    return out
 
 
-def evaluate(re: Plane, im: Plane, band: Band, position_px: Array) -> tuple[Array, Array, Array]:
-    """Score (s, n), information (s, n, n) and coherence (s, p) of every strip from weighted products (s, p, f)."""
-    strips, frames = re.shape[0], len(position_px)
+def evaluate(products: Products, weight: Array, position_px: Array) -> tuple[Array, Array, Array]:
+    """Score (s, n), information (s, n, n) and coherence (s, p) of every strip with weights (c, f)."""
+    strips, frames = len(products.rows), products.frames
     score, information = np.empty((strips, frames)), np.empty((strips, frames, frames))
-    coherence = np.empty((strips, pair_count(frames)))
-    position_scores(re, im, 2.0 * np.pi * band.frequency(), position_px, score, information, coherence)
+    coherence, factor = np.empty((strips, pair_count(frames))), weight.astype(np.float32)
+    position_scores(products.re, products.im, factor, products.band.omega(), position_px, score, information, coherence)
     return score, information, coherence
 
 
@@ -111,22 +98,17 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
         None if the likelihood has no maximum there.
     """
     basis = motion_basis(products.frames, len(start) == 2)
-    motion = np.array(start, dtype=np.float64)
+    motion, sums, omega = np.array(start, dtype=np.float64), products.total, products.band.omega()
     for _ in range(passes):
         position = basis @ motion - products.offset_px
         texture, noise, coherent = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
         weight = matched_weight(texture, noise, products.frames)
-        re, im = products.weighted(weight)
-        for _ in range(STEPS):
-            score, information, coherence = evaluate(re, im, products.band, basis @ motion - products.offset_px)
-            J = basis.T @ information.sum(axis=0) @ basis
-            if not (np.all(np.isfinite(J)) and float(np.linalg.eigvalsh(J)[0]) > 0.0):
-                return None
-            step = np.linalg.solve(J, basis.T @ score.sum(axis=0))
-            step *= min(1.0, MAX_STEP_PX / max(float(np.abs(step).max()), 1e-12))
-            motion += step
-            if float(np.abs(step).max()) < TOLERANCE_PX:
-                break
+        if not climb(sums.re, sums.im, weight.astype(np.float32), omega, basis, products.offset_px, motion, LIMITS):
+            return None
+    score, information, coherence = evaluate(products, weight, basis @ motion - products.offset_px)
+    J = basis.T @ information.sum(axis=0) @ basis
+    if not (np.all(np.isfinite(J)) and float(np.linalg.eigvalsh(J)[0]) > 0.0):
+        return None
     covariance = sandwich(score @ basis, J)
     return Fit(motion, covariance, score, information, coherence, texture, noise, weight, coherent)
 
@@ -158,12 +140,12 @@ def sandwich(score: Array, J: Array) -> Array:
 
 def best_bend(products: Products, fit: Fit) -> float:
     """Change of the displacement per frame [px] from a coarse look around a fit without one."""
-    basis = motion_basis(products.frames, True)
-    re, im = (plane.sum(axis=0, keepdims=True) for plane in products.weighted(fit.weight))
-    omega, pairs = 2.0 * np.pi * products.band.frequency(), np.empty((1, products.band.count))
+    basis, sums, omega = motion_basis(products.frames, True), products.total, products.band.omega()
+    pairs = np.empty(sums.power.shape)
 
     def gain(bend: float) -> float:
-        coherent_power(re, im, omega, basis @ np.array([fit.motion[0], bend]) - products.offset_px, pairs)
-        return float(pairs.sum())
+        position = basis @ np.array([fit.motion[0], bend]) - products.offset_px
+        coherent_power(sums.re, sums.im, omega, position, pairs)
+        return float(np.sum(fit.weight * pairs))
 
     return max(BENDS_PX, key=gain)

@@ -12,11 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.rows import sum_rows
 from axialnav.models.jit import kernel
 
 Plane = NDArray[np.float32]
 Index = NDArray[np.int64]
-STRIPS = 10
+STRIPS, BANDS = 10, 5  # two neighbouring strips make a band
+COARSE_CLASSES = 2  # enough to search with: a fourth to a half of the rows, most of the power
 MAX_LEVELS = 3
 MIN_BLOCKS = 20
 ROOT_HALF = np.float32(0.7071067811865476)
@@ -46,6 +48,11 @@ class RowLayout:
         Middle of every strip, -1 at the top and 1 at the bottom of all rows, shape (strips,).
     count
         Coefficient rows per strip and class, shape (strips, classes).
+    smooth
+        First row and one past the last, of every strip's smooth rows, shape (strips, 2).
+    coarse_rows, coarse_edges, coarse_count
+        The rows of the coarse classes, ordered by band and class; the first of every band and class among them, and
+        the end; and their numbers, shape (bands, coarse classes).
     """
 
     def __init__(self, rows: int) -> None:
@@ -70,31 +77,123 @@ class RowLayout:
                     target = self.edges[strip * self.classes + level] + (block - starts[strip]) * many
                     source = block * size + first[level]
                     self.place[source : source + many] = np.arange(target, target + many)
+        ends = self.edges[1:].reshape(STRIPS, self.classes)
+        firsts = self.edges[:-1].reshape(STRIPS, self.classes)
+        coarse = min(COARSE_CLASSES, self.classes)
+        self.smooth = np.stack([firsts[:, 0], ends[:, 0]], axis=1)
+        paired = [
+            [np.arange(firsts[s, c], ends[s, c]) for s in (2 * band, 2 * band + 1)]
+            for band in range(BANDS)
+            for c in range(coarse)
+        ]
+        self.coarse_rows = np.concatenate([rows for pair in paired for rows in pair]).astype(np.int64)
+        sizes = np.array([sum(map(len, pair)) for pair in paired], dtype=np.int64)
+        self.coarse_edges = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+        self.coarse_count = sizes.reshape(BANDS, coarse).astype(np.float64)
 
 
 @kernel
-def haar_rows(rows: Plane, levels: int, place: Index, work: Plane, out: Plane) -> None:
-    """Transform blocks of ``2^levels`` rows (r, w) and put coefficient ``j`` of block ``b`` into row ``place[b, j]``.
+def binned_coefficients(
+    frame: NDArray[np.uint8],
+    first_row: int,
+    height: int,
+    levels: int,
+    place: Index,
+    sums: NDArray[np.uint32],
+    work: Plane,
+    out: Plane,
+) -> None:
+    """Bin rows and transform blocks of ``2^levels`` of them; coefficient ``j`` of block ``b`` goes to ``place[b, j]``.
 
-    ``work`` (2^levels, w) is scratch.  Coefficients: the sum of the block, then differences from coarse to fine.
+    Parameters
+    ----------
+    frame
+        Picture (h, w).
+    first_row
+        Where the first bin starts.
+    height
+        Rows per bin.
+    levels, place
+        See :class:`RowLayout`.
+    sums, work
+        Scratch: (w,) as :func:`~axialnav.estimators.rows.row_sums` makes it, and (2^levels, w).
+    out
+        Sum of every block first, then differences from coarse to fine, shape (rows, w).
     """
     size = 1 << levels
-    columns = rows.shape[1]
     for block in range(place.shape[0] // size):
         for j in range(size):
-            for c in range(columns):
-                work[j, c] = rows[block * size + j, c]
+            sum_rows(frame, first_row + (block * size + j) * height, height, sums, work[j])
         many = size
         while many > 1:
             half = many // 2
             for j in range(half):
-                fine = out[place[block * size + half + j]]
-                for c in range(columns):
-                    a = work[2 * j, c]
-                    b = work[2 * j + 1, c]
-                    fine[c] = (a - b) * ROOT_HALF
-                    work[j, c] = (a + b) * ROOT_HALF
+                _butterfly(work[2 * j], work[2 * j + 1], out[place[block * size + half + j]], work[j])
             many = half
-        smooth = out[place[block * size]]
-        for c in range(columns):
-            smooth[c] = work[0, c]
+        out[place[block * size]] = work[0]
+
+
+@kernel
+def _butterfly(first: Plane, second: Plane, difference: Plane, total: Plane) -> None:
+    for c in range(first.shape[0]):
+        a, b = first[c], second[c]
+        difference[c] = (a - b) * ROOT_HALF
+        total[c] = (a + b) * ROOT_HALF
+
+
+@kernel
+def remove_level(rows: Plane, smooth: Index, means: Plane) -> None:
+    """Take the level of every column off the smooth rows: the median over five bands of its mean in the band.
+
+    It is where columns of the sensor, vignettes and upright objects fixed to the camera live, and a wall that moves
+    leaves almost nothing of itself there.  A plain mean would smear an object in one band over all rows.  Differences
+    of rows hold none of it.
+
+    Parameters
+    ----------
+    rows
+        Coefficients, shape (r, w).
+    smooth
+        First smooth row of every strip, and one past its last, shape (s, 2).
+    means
+        Scratch, shape (5, w).
+    """
+    strips = smooth.shape[0]
+    means[:] = np.float32(0.0)
+    for band in range(BANDS):
+        many = 0
+        for s in range(band * strips // BANDS, (band + 1) * strips // BANDS):
+            many += smooth[s, 1] - smooth[s, 0]
+            for r in range(smooth[s, 0], smooth[s, 1]):
+                _add(rows[r], means[band])
+        _scale(means[band], np.float32(1.0 / max(many, 1)))
+    _median(means[0], means[1], means[2], means[3], means[4])
+    for s in range(strips):
+        for r in range(smooth[s, 0], smooth[s, 1]):
+            _subtract(means[0], rows[r])
+
+
+@kernel
+def _add(line: Plane, total: Plane) -> None:
+    for c in range(total.shape[0]):
+        total[c] += line[c]
+
+
+@kernel
+def _subtract(line: Plane, total: Plane) -> None:
+    for c in range(total.shape[0]):
+        total[c] -= line[c]
+
+
+@kernel
+def _scale(line: Plane, factor: np.float32) -> None:
+    for c in range(line.shape[0]):
+        line[c] *= factor
+
+
+@kernel
+def _median(a: Plane, b: Plane, m: Plane, d: Plane, e: Plane) -> None:
+    """Median of five, into the first."""
+    for c in range(a.shape[0]):
+        low, high = max(min(a[c], b[c]), min(d[c], e[c])), min(max(a[c], b[c]), max(d[c], e[c]))
+        a[c] = max(min(low, high), min(m[c], max(low, high)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,26 +26,21 @@ from axialnav.estimators.integrity import (
 )
 from axialnav.estimators.joint import Fit
 from axialnav.estimators.kappa import blur_ratio
-from axialnav.estimators.layout import STRIPS
+from axialnav.estimators.layout import BANDS, STRIPS
 from axialnav.estimators.products import Products
 from axialnav.estimators.refine import fit_strips, follow
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
-from axialnav.estimators.search import STEP_PX, Profiles, lag_sums, profiles, unrelated_spread
-from axialnav.estimators.texture import matched_weight, shape_family, texture_power
+from axialnav.estimators.search import STEP_PX, Profiles
 from axialnav.estimators.window import FrameWindow
 
 Array = NDArray[np.float64]
-BANDS = 5
-TINY = 1e-12
 ENOUGH_BANDS = 3
 MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
-MAX_ROLL_STEPS = 4
 MAX_RIVAL_SHARE = 0.75
 MAX_SIGMA_PX = 0.3
 PRIOR_SIGMAS = 5.0
 PRIOR_MARGIN_PX = 1.0
-NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold mostly noise
 
 
 @dataclass(frozen=True)
@@ -93,25 +87,6 @@ def search_grid(width: int, frames: int, prior_px: tuple[float, float] | None) -
     return np.asarray(steps * STEP_PX, dtype=np.float64)
 
 
-def search(products: Products, grid_px: Array) -> Profiles:
-    """Profiles of all bands of the picture from fixed windows."""
-    frames, band, rows = products.frames, products.band, products.rows.sum(axis=0)
-    power = products.power.sum(axis=0, dtype=np.float64) / (frames * rows[:, None])
-    tail = int(NOISE_SHARE * band.count)
-    noise = np.full_like(power, float(power[-1, tail:].mean()) + TINY)
-    shapes = shape_family(band.first, band.count, band.length)
-    texture = [texture_power(power[c], noise[c], int(rows[c] * frames), shapes) for c in range(len(rows))]
-    weight = matched_weight(np.array(texture), noise, frames)
-    re, im = (_folded(plane) for plane in products.weighted(weight))
-    spread = unrelated_spread(_folded(products.power), weight, frames, _folded(products.rows))
-    return profiles(lag_sums(re, im, frames), band, grid_px, spread)
-
-
-def _folded(strips: NDArray[Any]) -> NDArray[Any]:
-    """Strips (s, ...) summed into bands (b, ...)."""
-    return np.asarray(strips.reshape(BANDS, -1, *strips.shape[1:]).sum(axis=1))
-
-
 def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     """Estimate the displacement of the frames in the window.
 
@@ -124,8 +99,8 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     """
     frames = len(window.order)
     span_s = (frames - 1) * options.frame_period_s
-    grid = search_grid(window.band.length, frames, options.prior_px)
-    found = search(window.fixed(), grid)
+    grid = search_grid(window.coarse.band.length, frames, options.prior_px)
+    found = window.coarse.profiles(window.order, grid)
     choice = choose(found, options.consensus)
     votes = (int(choice.agree.sum()), BANDS)
     reason = doubt_search(found, choice, options)

@@ -15,6 +15,8 @@ from axialnav.models.jit import kernel
 
 Plane = NDArray[np.float32]
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 CELL_PX = 16
 FLANK_PX = 12
 SURE = 5.0
@@ -23,17 +25,62 @@ LEAST_SHARE = 0.3
 
 
 @kernel
-def _cell_power(plane: Plane, edges: NDArray[np.int64], out: Array) -> None:
-    """Sum of squares in every cell (s, b)."""
-    column = np.empty(plane.shape[1], dtype=np.float32)
-    for s in range(out.shape[0]):
+def _cell_powers(
+    planes: Plane, order: Index, shift: Index, edges: Index, wanted: Mask, sums: Plane, out: Array
+) -> None:
+    """Power in every cell (s, b) of the sum of the shifted frames over the root of their number.
+
+    Noise keeps its power in it.
+
+    Parameters
+    ----------
+    planes
+        Binned frames by slot, shape (n, r, w).
+    order
+        Slots in use.
+    shift
+        Shift of each frame [px], around zero.
+    edges
+        First row of every strip and the end, shape (s + 1,).
+    wanted
+        Strips to look at, shape (s,).
+    sums
+        Scratch, shape (3, w).
+    out
+        Result, shape (s, b).
+    """
+    width = planes.shape[2]
+    total, column, seen = sums[0], sums[1], sums[2]
+    seen[:] = np.float32(0.0)
+    for k in range(order.shape[0]):
+        seen[max(0, -shift[k]) : min(width, width - shift[k])] += np.float32(1.0)
+    for s in range(edges.shape[0] - 1):
+        if not wanted[s]:
+            continue
         column[:] = np.float32(0.0)
         for r in range(edges[s], edges[s + 1]):
-            line = plane[r]
-            for c in range(column.shape[0]):
-                column[c] += line[c] * line[c]
+            total[:] = np.float32(0.0)
+            for k in range(order.shape[0]):
+                low, high = max(0, -shift[k]), min(width, width - shift[k])
+                _add(planes[order[k], r, low + shift[k] : high + shift[k]], total[low:high])
+            _add_square(total, column)
         for b in range(out.shape[1]):
-            out[s, b] = column[b * CELL_PX : (b + 1) * CELL_PX].sum()
+            power = np.float32(0.0)
+            for c in range(b * CELL_PX, (b + 1) * CELL_PX):
+                power += column[c] / max(seen[c], np.float32(1.0))
+            out[s, b] = power
+
+
+@kernel
+def _add(line: Plane, total: Plane) -> None:
+    for c in range(total.shape[0]):
+        total[c] += line[c]
+
+
+@kernel
+def _add_square(line: Plane, total: Plane) -> None:
+    for c in range(total.shape[0]):
+        total[c] += line[c] * line[c]
 
 
 class OccluderFinder:
@@ -41,46 +88,41 @@ class OccluderFinder:
 
     Parameters
     ----------
-    rows, width
-        Size of the binned frames.
+    width
+        Width of the binned frames.
     edges
         First row of every strip and the end, shape (s + 1,).
     """
 
-    def __init__(self, rows: int, width: int, edges: NDArray[np.int64]) -> None:
-        self._edges, self._cells = edges, width // CELL_PX
-        self._sum = np.zeros((rows, width), dtype=np.float32)
+    def __init__(self, width: int, edges: Index) -> None:
+        self._edges, self._all = edges, np.ones(len(edges) - 1, dtype=np.bool_)
+        self._sums = np.zeros((3, width), dtype=np.float32)
+        self._cells = np.zeros((3, len(edges) - 1, width // CELL_PX))
+        self._samples = np.diff(edges)[:, None] * float(CELL_PX)
 
-    def hidden(self, planes: list[Plane], offset: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Cells (s, b) in which something stands still before a wall that moves by ``offset`` [px] per frame (n,)."""
-        none = np.zeros((len(self._edges) - 1, self._cells), dtype=np.bool_)
-        if int(np.ptp(offset)) < LEAST_TRAVEL_PX:
-            return none
-        still = self._powers(planes, np.zeros_like(offset))
-        moving = self._powers(planes, offset)
-        one = np.empty(none.shape)
-        _cell_power(planes[0], self._edges, one)
-        samples = np.diff(self._edges)[:, None] * CELL_PX
-        usual = float(np.median(one / samples)) * samples
-        sure = SURE * usual * np.sqrt(2.0 / samples)
-        return np.asarray((still - moving > sure) & (still - usual > sure))
+    def hidden(self, planes: Plane, order: Index, offset: Index) -> Mask:
+        """Cells (s, b) in which something stands still before a wall that moves by ``offset`` [px] per frame (n,).
 
-    def _powers(self, planes: list[Plane], offset: NDArray[np.int64]) -> Array:
-        """Power per cell of the sum of the shifted frames over the root of their number: noise keeps its power."""
-        self._sum[:] = 0.0
-        width = self._sum.shape[1]
-        count = np.zeros(width, dtype=np.float32)
-        for plane, shift in zip(planes, offset - (offset.min() + offset.max()) // 2, strict=True):
-            low, high = max(0, -int(shift)), min(width, width - int(shift))
-            self._sum[:, low:high] += plane[:, low + int(shift) : high + int(shift)]
-            count[low:high] += 1.0
-        self._sum /= np.sqrt(np.maximum(count, 1.0))
-        out = np.empty((len(self._edges) - 1, self._cells))
-        _cell_power(self._sum, self._edges, out)
-        return out
+        ``planes`` (slots, r, w) are binned frames, ``order`` (n,) the slots in use, oldest first.
+        """
+        one, still, moving = self._cells
+        if int(offset.max() - offset.min()) < LEAST_TRAVEL_PX:
+            return np.zeros(still.shape, dtype=np.bool_)
+        _cell_powers(planes, order[:1], 0 * order[:1], self._edges, self._all, self._sums, one)
+        _cell_powers(planes, order, 0 * order, self._edges, self._all, self._sums, still)
+        usual = float(np.median(one / self._samples)) * self._samples
+        sure = SURE * usual * np.sqrt(2.0 / self._samples)
+        repeats: Mask = np.asarray(still - usual > sure)
+        doubtful: Mask = np.any(repeats, axis=1)
+        if not doubtful.any():
+            return repeats
+        shift = offset - (offset.min() + offset.max()) // 2
+        moving[:] = 0.0
+        _cell_powers(planes, order, shift, self._edges, doubtful, self._sums, moving)
+        return np.asarray(repeats & (still - moving > sure))
 
 
-def wall_window(hidden: NDArray[np.bool_], starts: NDArray[np.int64], window: Plane) -> tuple[Plane, Array]:
+def wall_window(hidden: Mask, starts: Index, window: Plane) -> tuple[Plane, Array]:
     """Windows of all strips without what is hidden in any frame, and the share of power they keep.
 
     Parameters
@@ -99,6 +141,8 @@ def wall_window(hidden: NDArray[np.bool_], starts: NDArray[np.int64], window: Pl
     share
         Shape (s,).
     """
+    if not hidden.any():
+        return np.repeat(window[None], len(hidden), axis=0), np.ones(len(hidden))
     columns = np.repeat(hidden, CELL_PX, axis=1)
     length, strips = len(window), len(hidden)
     blocked = np.zeros((strips, length), dtype=np.bool_)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.joint import Fit
-from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.positions import coherent_power, motion_basis, turns
 from axialnav.estimators.products import Products
-from axialnav.estimators.spectrum import pair_frames
+from axialnav.estimators.spectrum import pair_count, pair_frames
 
 Array = NDArray[np.float64]
 LOWEST_FREQUENCY = 0.15
@@ -34,22 +34,21 @@ def pattern_power(products: Products, fit: Fit) -> tuple[float, float]:
     fit
         Their fit.
     """
-    pairs, frequency = pair_frames(products.frames), products.band.frequency()
-    high = frequency > LOWEST_FREQUENCY
-    omega = 2.0 * np.pi * frequency[high]
-    wall = motion_basis(products.frames, len(fit.motion) == 2) @ fit.motion
-    rows = products.rows.sum(axis=0)
-    summed = products.re.sum(axis=0)[..., high] + 1j * products.im.sum(axis=0)[..., high]
-    step = (wall[pairs[:, 0]] - wall[pairs[:, 1]])[:, None] * omega
-    start = (products.offset_px[pairs[:, 0]] - products.offset_px[pairs[:, 1]])[:, None] * omega
-    at_camera = np.sum((summed * np.exp(-1j * start)).real, axis=1)
-    at_wall = np.sum((summed * np.exp(1j * (step - start))).real, axis=1)
-    many, alike = len(pairs), np.cos(step).sum(axis=0)
-    apart = many - alike**2 / many
-    weight = rows[:, None] * apart / (fit.texture + fit.noise)[:, high] ** 2
-    value = (at_camera - at_wall * alike / many) / (rows[:, None] * np.maximum(apart, 1e-6))
-    total = float(weight.sum())
-    return float(np.sum(weight * value)) / total, float(np.sqrt(WINDOW_VARIANCE / (2.0 * total)))
+    frames, sums, omega = products.frames, products.total, products.band.omega()
+    wall = motion_basis(frames, len(fit.motion) == 2) @ fit.motion
+    many = pair_count(frames)
+    at_camera, at_wall = np.empty((2, *sums.power.shape))
+    coherent_power(sums.re, sums.im, omega, -products.offset_px, at_camera)
+    coherent_power(sums.re, sums.im, omega, wall - products.offset_px, at_wall)
+    cosine, sine = np.empty((2, frames, len(omega)))
+    turns(omega, wall, cosine, sine)
+    alike = 0.5 * (cosine.sum(axis=0) ** 2 + sine.sum(axis=0) ** 2 - frames)
+    apart = np.maximum(many - alike**2 / many, 1e-6)
+    high = omega > 2.0 * np.pi * LOWEST_FREQUENCY
+    weight = (high * apart) / (fit.texture + fit.noise) ** 2
+    total = float(sums.rows @ weight.sum(axis=1))
+    match = float(np.sum(weight / apart * (at_camera - at_wall * (alike / many))))
+    return match / total, float(np.sqrt(WINDOW_VARIANCE / (2.0 * total)))
 
 
 def without_pattern(products: Products, power: float) -> Products:

@@ -12,6 +12,8 @@ acceleration, free positions) follows by a small matrix product.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,48 +24,76 @@ Plane = NDArray[np.float32]
 
 
 @kernel
+def turns(omega: Array, position: Array, cosine: Array, sine: Array) -> None:
+    """``exp(i w x_k)`` of all frames, shapes (n, f), by repeated turns: ``omega`` (f,) is evenly spaced."""
+    count = omega.shape[0]
+    step = omega[1] - omega[0]
+    for k in range(position.shape[0]):
+        c, s = np.cos(step * position[k]), np.sin(step * position[k])
+        x, y = np.cos(omega[0] * position[k]), np.sin(omega[0] * position[k])
+        for f in range(count):
+            cosine[k, f] = x
+            sine[k, f] = y
+            x, y = x * c - y * s, x * s + y * c
+
+
+@kernel
+def _relative(cosine: Array, sine: Array, i: int, j: int, c: Array, d: Array) -> None:
+    """``exp(i w (x_i - x_j))`` for every frequency."""
+    a, b, x, y = cosine[i], sine[i], cosine[j], sine[j]
+    for f in range(c.shape[0]):
+        c[f] = a[f] * x[f] + b[f] * y[f]
+        d[f] = b[f] * x[f] - a[f] * y[f]
+
+
+@kernel
+def _moments(re: Plane, im: Plane, c: Array, d: Array, omega: Array) -> tuple[float, float, float]:
+    """``sum Re E``, ``-sum w Im E`` and ``sum w^2 Re E`` of one pair."""
+    sum_re, slope, bend = 0.0, 0.0, 0.0
+    for f in range(omega.shape[0]):
+        real = re[f] * c[f] - im[f] * d[f]
+        imaginary = omega[f] * (re[f] * d[f] + im[f] * c[f])
+        sum_re += real
+        slope -= imaginary
+        bend += omega[f] * omega[f] * real
+    return sum_re, slope, bend
+
+
+@kernel
 def position_scores(
     re: Plane,
     im: Plane,
+    weight: Plane,
     omega: Array,
     position: Array,
     score: Array,
     information: Array,
     coherence: Array,
 ) -> None:
-    """Fill score (s, n), information (s, n, n) and coherence (s, p) = ``sum_f Re E`` of every strip.
+    """Fill score (s, n), information (s, n, n) and coherence (s, p) = ``sum_f w Re E`` of every strip.
 
-    Pair products ``re``, ``im`` (s, p, f), weights included, in the order of ``pair_frames``; ``omega`` (f,)
-    [rad/px]; ``position`` (n,) [px] at which to evaluate.
+    Pair products ``re``, ``im`` (s, c, p, f) in the order of ``pair_frames``; their weights (c, f); ``omega`` (f,)
+    [rad/px], evenly spaced; ``position`` (n,) [px] at which to evaluate.
     """
-    strips, _, count = re.shape
+    strips, classes, _, count = re.shape
     frames = position.shape[0]
-    cosine = np.empty((frames, count))
-    sine = np.empty((frames, count))
-    for k in range(frames):
-        for f in range(count):
-            cosine[k, f] = np.cos(omega[f] * position[k])
-            sine[k, f] = np.sin(omega[f] * position[k])
-    omega2 = omega * omega
+    cosine, sine = np.empty((frames, count)), np.empty((frames, count))
+    turns(omega, position, cosine, sine)
+    c, d = np.empty(count), np.empty(count)
+    sum_re, sum_im = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
     score[:] = 0.0
     information[:] = 0.0
     p = 0
     for i in range(frames):
         for j in range(i + 1, frames):
+            _relative(cosine, sine, i, j, c, d)
             for s in range(strips):
-                a, b = re[s, p], im[s, p]
-                slope = 0.0
-                bend = 0.0
-                sum_re = 0.0
-                for f in range(count):
-                    c = cosine[i, f] * cosine[j, f] + sine[i, f] * sine[j, f]
-                    d = sine[i, f] * cosine[j, f] - cosine[i, f] * sine[j, f]
-                    e_re = a[f] * c - b[f] * d
-                    e_im = a[f] * d + b[f] * c
-                    sum_re += e_re
-                    slope -= omega[f] * e_im
-                    bend += omega2[f] * e_re
-                coherence[s, p] = sum_re
+                sum_re[:] = np.float32(0.0)
+                sum_im[:] = np.float32(0.0)
+                for k in range(classes):
+                    _add_weighted(re[s, k, p], weight[k], sum_re)
+                    _add_weighted(im[s, k, p], weight[k], sum_im)
+                coherence[s, p], slope, bend = _moments(sum_re, sum_im, c, d, omega)
                 score[s, i] += 2.0 * slope
                 score[s, j] -= 2.0 * slope
                 information[s, i, j] -= 2.0 * bend
@@ -73,16 +103,110 @@ def position_scores(
             p += 1
 
 
+@kernel
+def _add_weighted(values: Plane, weight: Plane, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] += values[f] * weight[f]
+
+
+@kernel
+def climb(
+    re: Plane, im: Plane, weight: Plane, omega: Array, basis: Array, offset: Array, motion: Array, limits: Array
+) -> bool:
+    """Newton steps on the likelihood of ``motion`` (m,), in place; whether it has a maximum there.
+
+    Parameters
+    ----------
+    re, im
+        Pair products of all strips together, shape (c, p, f).
+    weight
+        Shape (c, f).
+    omega
+        Frequencies [rad/px], evenly spaced, shape (f,).
+    basis
+        Positions per parameter, shape (n, m), m <= 2.
+    offset
+        Positions of the windows [px], shape (n,).
+    motion
+        Start, and result.
+    limits
+        Longest step [px], step that ends the search [px], number of steps.
+    """
+    classes, pairs, count = re.shape
+    sum_re, sum_im = np.zeros((1, 1, pairs, count), dtype=np.float32), np.zeros((1, 1, pairs, count), dtype=np.float32)
+    for k in range(classes):
+        for p in range(pairs):
+            _add_weighted(re[k, p], weight[k], sum_re[0, 0, p])
+            _add_weighted(im[k, p], weight[k], sum_im[0, 0, p])
+    one = np.ones((1, count), dtype=np.float32)
+    frames, many = basis.shape
+    score, information = np.empty((1, frames)), np.empty((1, frames, frames))
+    coherence, position = np.empty((1, pairs)), np.empty(frames)
+    g, J = np.empty(many), np.empty((many, many))
+    for _ in range(int(limits[2])):
+        for k in range(frames):
+            position[k] = np.sum(basis[k] * motion) - offset[k]
+        position_scores(sum_re, sum_im, one, omega, position, score, information, coherence)
+        _project(basis, score[0], information[0], g, J)
+        longest = _newton_step(g, J)
+        if longest < 0.0:
+            return False
+        motion += g * min(1.0, limits[0] / max(longest, 1e-12))
+        if longest < limits[1]:
+            break
+    return True
+
+
+@kernel
+def _project(basis: Array, score: Array, information: Array, g: Array, J: Array) -> None:
+    """Score and information of the parameters."""
+    frames, many = basis.shape
+    g[:] = 0.0
+    J[:] = 0.0
+    for i in range(frames):
+        for a in range(many):
+            g[a] += basis[i, a] * score[i]
+            for j in range(frames):
+                for b in range(many):
+                    J[a, b] += basis[i, a] * information[i, j] * basis[j, b]
+
+
+@kernel
+def _newton_step(g: Array, J: Array) -> float:
+    """Replace ``g`` (m,) by the step ``J^-1 g``, m <= 2; its longest part, or -1 if there is no maximum."""
+    if g.shape[0] == 1:
+        if not J[0, 0] > 0.0:
+            return -1.0
+        g[0] /= J[0, 0]
+        return float(abs(g[0]))
+    determinant = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+    if not (determinant > 0.0 and J[0, 0] > 0.0):
+        return -1.0
+    first = (J[1, 1] * g[0] - J[0, 1] * g[1]) / determinant
+    g[1] = (J[0, 0] * g[1] - J[1, 0] * g[0]) / determinant
+    g[0] = first
+    return float(max(abs(g[0]), abs(g[1])))
+
+
+@lru_cache(maxsize=64)
 def centred_times(frames: int) -> Array:
     """Frame times from the middle of the window [periods], shape (n,)."""
     return np.arange(frames, dtype=np.float64) - 0.5 * (frames - 1)
 
 
+@lru_cache(maxsize=64)
 def motion_basis(frames: int, accelerated: bool) -> Array:
     """Positions per parameter, shape (n, 1 or 2): displacement per frame, and its change per frame."""
     t = centred_times(frames)
     basis = np.stack([t, 0.5 * (t**2 - np.mean(t**2))], axis=1)
-    return np.asarray(basis[:, : 2 if accelerated else 1], dtype=np.float64)
+    return np.array(basis[:, : 2 if accelerated else 1], dtype=np.float64, order="C")
+
+
+@lru_cache(maxsize=64)
+def free_positions(frames: int, fitted: int) -> Array:
+    """Orthonormal positions that neither a common shift nor the first ``fitted`` parameters explain, (n, n-1-m)."""
+    known = np.column_stack([np.ones(frames), motion_basis(frames, True)[:, :fitted]])
+    return np.ascontiguousarray(np.linalg.svd(known.T)[2][known.shape[1] :].T)
 
 
 @kernel
@@ -90,17 +214,19 @@ def coherent_power(re: Plane, im: Plane, omega: Array, position: Array, out: Arr
     """Sum ``Re E_ij`` over all pairs for every frequency: products (c, p, f) to ``out`` (c, f)."""
     frames, count = position.shape[0], omega.shape[0]
     cosine, sine = np.empty((frames, count)), np.empty((frames, count))
-    for k in range(frames):
-        for f in range(count):
-            cosine[k, f] = np.cos(omega[f] * position[k])
-            sine[k, f] = np.sin(omega[f] * position[k])
+    turns(omega, position, cosine, sine)
+    c, d = np.empty(count), np.empty(count)
     out[:] = 0.0
-    for c in range(re.shape[0]):
-        p = 0
-        for i in range(frames):
-            for j in range(i + 1, frames):
-                for f in range(count):
-                    turn_re = cosine[i, f] * cosine[j, f] + sine[i, f] * sine[j, f]
-                    turn_im = sine[i, f] * cosine[j, f] - cosine[i, f] * sine[j, f]
-                    out[c, f] += re[c, p, f] * turn_re - im[c, p, f] * turn_im
-                p += 1
+    p = 0
+    for i in range(frames):
+        for j in range(i + 1, frames):
+            _relative(cosine, sine, i, j, c, d)
+            for k in range(re.shape[0]):
+                _add_real(re[k, p], im[k, p], c, d, out[k])
+            p += 1
+
+
+@kernel
+def _add_real(re: Plane, im: Plane, c: Array, d: Array, out: Array) -> None:
+    for f in range(out.shape[0]):
+        out[f] += re[f] * c[f] - im[f] * d[f]

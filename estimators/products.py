@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.spectrum import Band
+from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
@@ -61,10 +63,37 @@ class Products:
             height=self.height[strips],
         )
 
-    def weighted(self, weight: Array) -> tuple[Plane, Plane]:
-        """Sum over the classes with weights (c, f): two planes of shape (s, p, f)."""
-        factor = weight.astype(np.float32)
-        return (
-            np.einsum("scpf,cf->spf", self.re, factor, optimize=False),
-            np.einsum("scpf,cf->spf", self.im, factor, optimize=False),
-        )
+    @cached_property
+    def total(self) -> Sums:
+        """The strips summed up."""
+        classes, pairs, count = self.re.shape[1:]
+        re, im = np.zeros((2, classes, pairs, count), dtype=np.float32)
+        power = np.zeros((classes, count), dtype=np.float32)
+        _sum_strips(self.re, self.im, self.power, re, im, power)
+        return Sums(re, im, power, self.rows.sum(axis=0))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """:class:`Products` with the strips summed up: shapes (c, p, f), (c, f) and (c,)."""
+
+    re: Plane
+    im: Plane
+    power: Plane
+    rows: Array
+
+
+@kernel
+def _sum_strips(re: Plane, im: Plane, power: Plane, out_re: Plane, out_im: Plane, out_power: Plane) -> None:
+    for s in range(re.shape[0]):
+        for c in range(re.shape[1]):
+            _add(power[s, c], out_power[c])
+            for p in range(re.shape[2]):
+                _add(re[s, c, p], out_re[c, p])
+                _add(im[s, c, p], out_im[c, p])
+
+
+@kernel
+def _add(line: Plane, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] += line[f]

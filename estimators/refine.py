@@ -16,28 +16,27 @@ from axialnav.estimators.window import FrameWindow
 
 Mask = NDArray[np.bool_]
 MAX_ROLL_STEPS = 4
+DRIFT_SHARE = 1.0  # of a bin: drift over the whole window that is worth following
 UNMOVED = Drift(0.0, False)
 
 
 def follow(window: FrameWindow, start_px: float, strips: Mask, exposure_ratio: float) -> tuple[Drift, Products]:
     """Products of some strips from windows that follow the wall, and the drift they follow across the rows.
 
-    A drift that makes the frames less alike is that of something else (a slanting cable, say) and is not followed.
+    A drift with which the strips agree less is that of something else (a slanting cable, say) and is not followed.
     """
     drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
-    products = window.following(start_px, drift.cross_px).selected(strips)
-    if abs(drift.cross_px) * (len(window.order) - 1) < window.bin_height:
-        return drift, products
-    with_drift = _likeness(fit_motion(products, np.array([start_px]), exposure_ratio, passes=1))
-    products = window.following(start_px).selected(strips)
-    if _likeness(fit_motion(products, np.array([start_px]), exposure_ratio, passes=1)) >= with_drift:
-        return UNMOVED, products
+    if abs(drift.cross_px) * (len(window.order) - 1) < DRIFT_SHARE * window.bin_height:
+        return drift, window.following(start_px).selected(strips)
+
+    def spread(cross_px: float) -> float:
+        products = window.following(start_px, cross_px).selected(strips)
+        fit = fit_motion(products, np.array([start_px]), exposure_ratio, passes=1)
+        return float(fit.covariance[0, 0]) if fit is not None else np.inf
+
+    if spread(0.0) <= spread(drift.cross_px):
+        drift = UNMOVED
     return drift, window.following(start_px, drift.cross_px).selected(strips)
-
-
-def _likeness(fit: Fit | None) -> float:
-    """Share of the power that moves with the wall [-]."""
-    return float(fit.texture.sum() / (fit.texture.sum() + fit.noise.sum())) if fit is not None else 0.0
 
 
 def fit_strips(products: Products, start_px: float, exposure_ratio: float, consensus: bool) -> tuple[Fit | None, int]:

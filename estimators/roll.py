@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.extra import extra_step
 from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
-from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.positions import free_positions, motion_basis
 from axialnav.estimators.products import Products
 from axialnav.models.jit import kernel
 
@@ -28,23 +29,9 @@ def roll_step(fit: Fit, height: Array) -> Array | None:
     ``height`` (s,) is the place of every strip, from -1 at the top to 1 at the bottom.
     """
     frames = fit.score.shape[1]
-    known = motion_basis(frames, len(fit.motion) == 2)
-    free = np.linalg.svd(np.ones((1, frames)))[2][1:].T
-    crossed = np.einsum("s,sij->ij", height, fit.information)
-    squared = np.einsum("s,sij->ij", height**2, fit.information)
-    J = np.block(
-        [
-            [known.T @ fit.information.sum(axis=0) @ known, known.T @ crossed @ free],
-            [free.T @ crossed @ known, free.T @ squared @ free],
-        ]
-    )
-    if float(np.linalg.eigvalsh(J)[0]) <= 0.0:
-        return None
-    g = np.concatenate([known.T @ fit.score.sum(axis=0), free.T @ (height @ fit.score)])
-    covariance = np.linalg.inv(J)
-    many = known.shape[1]
-    step = (covariance @ g)[many:]
-    chi2 = float(step @ np.linalg.solve(covariance[many:, many:], step)) / WINDOW_VARIANCE
+    known, free = motion_basis(frames, len(fit.motion) == 2), free_positions(frames, 0)
+    step = np.zeros(frames - 1)
+    chi2 = extra_step(fit.score, fit.information, height, known, free, step) / WINDOW_VARIANCE
     if chi2 < CHI2_OFFSET + CHI2_PER_DOF * (frames - 1):
         return None
     shift = free @ step

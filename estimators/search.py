@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from axialnav.estimators.spectrum import Band
+from axialnav.estimators.texture import group_starts, matched_weight, shape_family, texture_power
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
 STEP_PX = 0.25
+SAMPLES_PER_PX = 2
 SOFTENING = 3.0  # windows and texture that is not Gaussian make the likelihood over-confident by about this factor
 NEAR_PX = 1.0
 RIVAL_PX = 8.0
+TINY = 1e-12
+NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold mostly noise
 HANN_VARIANCE = 1.94  # of a sum over neighbouring bins, which a Hann window makes dependent
 
 
@@ -42,73 +46,127 @@ class Profiles:
         """Sum over some bands, shape (d,)."""
         return np.asarray(self.gain[bands].sum(axis=0))
 
+    def near(self, index: int, reach_px: float) -> slice:
+        """Grid points within ``reach_px`` of a grid point."""
+        steps = int(reach_px / (self.grid_px[1] - self.grid_px[0]) + 1e-9)
+        return slice(max(0, index - steps), index + steps + 1)
+
     def significance(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Height of the total at a grid point in standard deviations of unrelated frames."""
         return float(self.gain[bands, index].sum() / np.sqrt(np.sum(self.spread[bands] ** 2)))
 
     def outside_mass(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Posterior mass further than 1 px from a grid point, under the softened likelihood."""
-        total = self.total(bands) / SOFTENING
-        mass = np.exp(np.minimum(total - total[index], 50.0))
-        near = np.abs(self.grid_px - self.grid_px[index]) <= NEAR_PX
-        return float(mass[~near].sum() / mass.sum())
+        total = self.total(bands)
+        mass = np.exp(np.minimum((total - total[index]) / SOFTENING, 50.0))
+        whole = float(mass.sum())
+        mass[self.near(index, NEAR_PX)] = 0.0
+        return float(mass.sum()) / whole
 
     def rival_share(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Highest total elsewhere (further than 8 px) over the total at a grid point [-]."""
         total = self.total(bands)
-        far = np.abs(self.grid_px - self.grid_px[index]) > RIVAL_PX
-        if not far.any() or total[index] <= 0.0:
-            return 0.0
-        return float(total[far].max() / total[index])
+        near = self.near(index, RIVAL_PX)
+        far = [float(part.max()) for part in (total[: near.start], total[near.stop :]) if len(part)]
+        return max(far) / float(total[index]) if far and total[index] > 0.0 else 0.0
 
 
-def lag_sums(re: Plane, im: Plane, frames: int) -> NDArray[np.complex64]:
-    """Sum weighted pair products (b, p, f) of equal distance in time: complex, shape (b, n - 1, f), lag 1 first."""
-    bands, _, count = re.shape
-    sums = np.zeros((bands, frames - 1, count), dtype=np.complex64)
-    p = 0
-    for i in range(frames):
-        for j in range(i + 1, frames):
-            sums[:, j - i - 1].real += re[:, p]
-            sums[:, j - i - 1].imag += im[:, p]
-            p += 1
-    return sums
-
-
-def profiles(sums: NDArray[np.complex64], band: Band, grid_px: Array, spread: Array) -> Profiles:
-    """Evaluate ``2 sum_m sum_f Re(C_m exp(-i w d m))`` on the grid of displacements.
+class LagTransform:
+    """From pair products to the profiles of all bands; scratch of one size.
 
     Parameters
     ----------
-    sums
-        Lag sums C_m, weights included, shape (b, lags, f).
+    bands
+        Bands of the picture.
+    frames
+        Number of frames.
     band
         Frequencies in use.
-    grid_px
-        Displacements [px], shape (d,).
-    spread
-        See :class:`Profiles`.
     """
-    length = 2 * band.length
-    padded = np.zeros((*sums.shape[:2], length // 2 + 1), dtype=np.complex64)
-    padded[..., band.first : band.last] = np.conj(sums)
-    correlation = scipy.fft.irfft(padded, length, axis=-1) * np.float32(length)
-    gain = np.zeros((sums.shape[0], grid_px.shape[0]))
-    _gather(np.asarray(correlation, dtype=np.float32), grid_px, 2.0, gain)
-    return Profiles(grid_px, gain, spread)
+
+    def __init__(self, bands: int, frames: int, band: Band) -> None:
+        self.band, self.bands = band, bands
+        length = SAMPLES_PER_PX * band.length
+        self._sums = np.zeros((2, bands * (frames - 1), band.count), dtype=np.float32)
+        self._packed = np.zeros((bands * (frames - 1), length), dtype=np.float32)
+        self._correlation = np.zeros_like(self._packed)
+
+    def profiles(
+        self, re: Plane, im: Plane, order: NDArray[np.int64], weight: Array, grid_px: Array, spread: Array
+    ) -> Profiles:
+        """Evaluate ``2 sum_m sum_f Re(C_m exp(-i w d m))`` on the grid of displacements.
+
+        Parameters
+        ----------
+        re, im
+            Sums of ``Y_i conj(Y_j)`` for the frames in slots i, j, shape (n, n, b * c, f): only those of an older frame
+            i and a younger j are read.
+        order
+            Slots of the frames, oldest first.
+        weight
+            Matched weights, shape (c, f).
+        grid_px
+            Displacements [px], evenly spaced, shape (d,).
+        spread
+            See :class:`Profiles`.
+        """
+        lags = self.bands * (len(order) - 1)
+        sums, packed, correlation = self._sums[:, :lags], self._packed[:lags], self._correlation[:lags]
+        lag_sums(re, im, order, weight.astype(np.float32), sums)
+        _pack(sums, self.band.first, packed)
+        cv2.dft(packed, correlation, flags=cv2.DFT_ROWS | cv2.DFT_INVERSE | cv2.DFT_REAL_OUTPUT)
+        gain = np.zeros((self.bands, len(grid_px)))
+        step = float(grid_px[1] - grid_px[0])
+        _gather(correlation.reshape(self.bands, -1, packed.shape[1]), float(grid_px[0]), step, gain)
+        return Profiles(grid_px, gain, spread)
 
 
 @kernel
-def _gather(correlation: Plane, grid_px: Array, samples_per_px: float, gain: Array) -> None:
+def lag_sums(re: Plane, im: Plane, order: NDArray[np.int64], weight: Plane, sums: Plane) -> None:
+    """Weighted sums over all pairs of equal distance in time: (n, n, b * c, f) to (2, b * lags, f), lag 1 first."""
+    frames, classes = order.shape[0], weight.shape[0]
+    sums[:] = np.float32(0.0)
+    for i in range(frames):
+        for j in range(i + 1, frames):
+            for b in range(re.shape[2] // classes):
+                row = b * (frames - 1) + j - i - 1
+                for c in range(classes):
+                    group = b * classes + c
+                    _add_weighted(re[order[i], order[j], group], weight[c], sums[0, row])
+                    _add_weighted(im[order[i], order[j], group], weight[c], sums[1, row])
+
+
+@kernel
+def _add_weighted(values: Plane, weight: Plane, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] += values[f] * weight[f]
+
+
+@kernel
+def _pack(sums: Plane, first: int, packed: Plane) -> None:
+    """Conjugate spectra as rows of (Re_0, Re_1, Im_1, Re_2, ...), the form that the inverse transform takes."""
+    for r in range(packed.shape[0]):
+        re, im, line = sums[0, r], sums[1, r], packed[r, 2 * first - 1 :]
+        for f in range(re.shape[0]):
+            line[2 * f] = re[f]
+            line[2 * f + 1] = -im[f]
+
+
+@kernel
+def _gather(correlation: Plane, first_px: float, step_px: float, gain: Array) -> None:
+    """Read lag m of the circular correlations (b, m, l) at m times every displacement, between samples linearly."""
     bands, lags, length = correlation.shape
     for b in range(bands):
         for m in range(lags):
             line = correlation[b, m]
-            for d in range(grid_px.shape[0]):
-                place = grid_px[d] * (m + 1) * samples_per_px
+            factor = (m + 1) * SAMPLES_PER_PX
+            for d in range(gain.shape[1]):
+                place = (first_px + d * step_px) * factor
                 left = int(np.floor(place))
                 share = place - left
-                gain[b, d] += line[left % length] * (1.0 - share) + line[(left + 1) % length] * share
+                left = left % length if left < 0 or left >= length else left
+                right = left + 1 if left + 1 < length else 0
+                gain[b, d] += line[left] * (1.0 - share) + line[right] * share
 
 
 def unrelated_spread(power: Plane, weight: Array, frames: int, rows: Array) -> Array:
@@ -129,3 +187,13 @@ def unrelated_spread(power: Plane, weight: Array, frames: int, rows: Array) -> A
     of_one_frame = weight * power / frames
     variance = np.sum(np.sum(of_one_frame**2, axis=-1) / rows, axis=-1)
     return np.asarray(np.sqrt(2.0 * HANN_VARIANCE * pairs * variance))
+
+
+def search_weight(power: Array, looks: Array, band: Band, frames: int) -> Array:
+    """Matched weights from the mean power (c, f) of ``looks`` (c,) rows; white noise, read off the finest class."""
+    tail = int(NOISE_SHARE * band.count)
+    noise = np.full(band.count, float(power[-1, tail:].mean()) + TINY)
+    shapes, texture = shape_family(band.first, band.count, band.length), np.empty_like(power)
+    for c in range(len(power)):
+        texture_power(power[c], noise, float(looks[c]), shapes, group_starts(band.count), texture[c])
+    return matched_weight(texture, noise, frames)

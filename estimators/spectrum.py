@@ -53,6 +53,10 @@ class Band:
         """Frequencies [cycles/px], shape (count,)."""
         return np.arange(self.first, self.last, dtype=np.float64) / self.length
 
+    def omega(self) -> Array:
+        """Frequencies [rad/px], shape (count,)."""
+        return 2.0 * np.pi * self.frequency()
+
 
 def pair_count(frames: int) -> int:
     """Number of pairs i < j of ``frames`` frames."""
@@ -73,29 +77,29 @@ def row_spectra(windowed: Plane, band: Band, packed: Plane, re: Plane, im: Plane
 @kernel
 def _unpack(packed: Plane, first: int, re: Plane, im: Plane) -> None:
     for r in range(re.shape[0]):
-        line = packed[r]
-        for f in range(re.shape[1]):
-            re[r, f] = line[2 * (first + f) - 1]
-            im[r, f] = line[2 * (first + f)]
+        _deinterleave(packed[r, 2 * first - 1 :], re[r], im[r])
+
+
+@kernel
+def _deinterleave(line: Plane, re: Plane, im: Plane) -> None:
+    for f in range(re.shape[0]):
+        re[f] = line[2 * f]
+        im[f] = line[2 * f + 1]
 
 
 @kernel
 def pair_products(
     re_i: Plane, im_i: Plane, re_j: Plane, im_j: Plane, edges: NDArray[np.int64], out_re: Plane, out_im: Plane
 ) -> None:
-    """Sums of ``Y_i conj(Y_j)`` over the rows of every strip.
+    """Sums of ``Y_i conj(Y_j)`` over the rows of every group.
 
-    Spectra (r, f) as planes; ``edges`` (s + 1,) first row of every strip; outputs (s, f).
+    Spectra (r, f) as planes; ``edges`` (g + 1,) first row of every group; outputs (g, f).
     """
-    for s in range(edges.shape[0] - 1):
-        acc_re, acc_im = out_re[s], out_im[s]
-        acc_re[:] = np.float32(0.0)
-        acc_im[:] = np.float32(0.0)
-        for r in range(edges[s], edges[s + 1]):
-            a, b, c, d = re_i[r], im_i[r], re_j[r], im_j[r]
-            for f in range(a.shape[0]):
-                acc_re[f] += a[f] * c[f] + b[f] * d[f]
-                acc_im[f] += b[f] * c[f] - a[f] * d[f]
+    out_re[:] = np.float32(0.0)
+    out_im[:] = np.float32(0.0)
+    for g in range(edges.shape[0] - 1):
+        for r in range(edges[g], edges[g + 1]):
+            _add_product(re_i[r], im_i[r], re_j[r], im_j[r], out_re[g], out_im[g])
 
 
 @kernel
@@ -108,26 +112,28 @@ def _add_product(a: Plane, b: Plane, c: Plane, d: Plane, out_re: Plane, out_im: 
 
 @kernel
 def all_pair_products(re: Plane, im: Plane, edges: NDArray[np.int64], out_re: Plane, out_im: Plane) -> None:
-    """:func:`pair_products` of every pair of frames: spectra (n, r, f), outputs (s, p, f)."""
+    """:func:`pair_products` of every pair of frames: spectra (n, r, f), outputs (g, p, f)."""
     frames = re.shape[0]
     out_re[:] = np.float32(0.0)
     out_im[:] = np.float32(0.0)
-    for s in range(edges.shape[0] - 1):
+    for g in range(edges.shape[0] - 1):
         p = 0
         for i in range(frames):
             for j in range(i + 1, frames):
-                for r in range(edges[s], edges[s + 1]):
-                    _add_product(re[i, r], im[i, r], re[j, r], im[j, r], out_re[s, p], out_im[s, p])
+                for r in range(edges[g], edges[g + 1]):
+                    _add_product(re[i, r], im[i, r], re[j, r], im[j, r], out_re[g, p], out_im[g, p])
                 p += 1
 
 
 @kernel
-def power(re: Plane, im: Plane, edges: NDArray[np.int64], out: Plane) -> None:
-    """Sums of ``|Y|^2`` over the rows of every strip, shape (s, f)."""
-    for s in range(edges.shape[0] - 1):
-        acc = out[s]
-        acc[:] = np.float32(0.0)
-        for r in range(edges[s], edges[s + 1]):
-            a, b = re[r], im[r]
-            for f in range(a.shape[0]):
-                acc[f] += a[f] * a[f] + b[f] * b[f]
+def add_power(re: Plane, im: Plane, edges: NDArray[np.int64], out: Plane) -> None:
+    """Add the sums of ``|Y|^2`` over the rows of every group to ``out`` (g, f)."""
+    for g in range(edges.shape[0] - 1):
+        for r in range(edges[g], edges[g + 1]):
+            _add_square(re[r], im[r], out[g])
+
+
+@kernel
+def _add_square(a: Plane, b: Plane, out: Plane) -> None:
+    for f in range(a.shape[0]):
+        out[f] += a[f] * a[f] + b[f] * b[f]

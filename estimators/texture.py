@@ -18,15 +18,18 @@ from numpy.typing import NDArray
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
+Index = NDArray[np.int64]
 SLOPES = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 LENS_SIGMAS_PX = (0.3, 0.7, 1.2, 2.0)
 SINGLE_GROUPS = 12
 GROUP_GROWTH = 1.07
 NOISE_BLOCKS = 10
 PASSES = 3
+NOISE_FLOOR, TINY = 1e-3, 1e-12
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def group_starts(count: int) -> NDArray[np.int64]:
     """First bin of every group of neighbouring bins: single ones at first, then ever wider, shape (groups,)."""
     starts, width, at = [], 1.0, 0
@@ -37,14 +40,19 @@ def group_starts(count: int) -> NDArray[np.int64]:
     return np.array(starts, dtype=np.int64)
 
 
-def group_means(values: Array) -> Array:
-    """Mean of ``values`` (..., f) in every group, shape (..., groups)."""
-    starts = group_starts(values.shape[-1])
-    sizes = np.diff(np.append(starts, values.shape[-1]))
-    return np.asarray(np.add.reduceat(values, starts, axis=-1) / sizes)
+@kernel
+def group_means(values: Array, starts: Index, out: Array) -> None:
+    """Mean of ``values`` (f,) in every group, shape (g,)."""
+    groups = starts.shape[0]
+    for g in range(groups):
+        end = starts[g + 1] if g + 1 < groups else values.shape[0]
+        total = 0.0
+        for f in range(starts[g], end):
+            total += values[f]
+        out[g] = total / (end - starts[g])
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def shape_family(first: int, count: int, length: int) -> Array:
     """Power laws behind Gaussian lenses: candidate shapes of q, shape (shapes, count), 1 at the first bin."""
     f = np.arange(first, first + count) / length
@@ -59,17 +67,29 @@ def blur_power(length_px: float, frequency: Array) -> Array:
     return np.asarray(np.sinc(length_px * frequency) ** 2 + 1e-4)
 
 
-def smooth_noise(incoherent: Array, floor: float) -> Array:
-    """Noise power per frequency: block means of the incoherent power (f,), joined by straight lines."""
+@kernel
+def smooth_noise(incoherent: Array, floor: float, out: Array) -> None:
+    """Noise power per frequency (f,): block means of the incoherent power (f,), joined by straight lines."""
     count = incoherent.shape[0]
-    edges = np.linspace(0, count, min(NOISE_BLOCKS, count) + 1).astype(np.int64)
-    means = np.add.reduceat(incoherent, edges[:-1]) / np.diff(edges)
-    middles = 0.5 * (edges[:-1] + edges[1:] - 1)
-    return np.asarray(np.interp(np.arange(count), middles, np.maximum(means, floor)))
+    blocks = min(NOISE_BLOCKS, count)
+    before, level_before = 0.0, 0.0
+    at = 0
+    for b in range(blocks):
+        first, end = b * count // blocks, (b + 1) * count // blocks
+        total = 0.0
+        for f in range(first, end):
+            total += incoherent[f]
+        level, middle = max(total / (end - first), floor), 0.5 * (first + end - 1)
+        while at < count and at <= middle:
+            out[at] = level if b == 0 else level_before + (level - level_before) * (at - before) / (middle - before)
+            at += 1
+        before, level_before = middle, level
+    out[at:] = level_before
 
 
-def texture_power(power: Array, noise: Array, looks: int, shapes: Array) -> Array:
-    """Texture power (f,) of the member of ``shapes`` (m, f) that explains ``power - noise`` best.
+@kernel
+def texture_power(power: Array, noise: Array, looks: float, shapes: Array, starts: Index, out: Array) -> None:
+    """Texture power (f,): the member of ``shapes`` (m, f) that explains ``power - noise`` best.
 
     Parameters
     ----------
@@ -81,16 +101,27 @@ def texture_power(power: Array, noise: Array, looks: int, shapes: Array) -> Arra
         Number of independent squares that ``power`` is a mean of.
     shapes
         Candidate shapes.
+    starts
+        First bin of every group of neighbouring bins.
+    out
+        Result.
 
     Notes
     -----
     Whittle's likelihood; the amplitude of every candidate by iterated weighted least squares, never below its own
     standard deviation, so that a texture lost in the noise keeps a weight.
     """
-    starts = group_starts(power.shape[0])
-    sizes = np.diff(np.append(starts, power.shape[0])).astype(np.float64)
-    best, amplitude = _best_shape(group_means(power), group_means(noise), group_means(shapes), sizes, float(looks))
-    return np.asarray(amplitude * shapes[best])
+    groups, many = starts.shape[0], shapes.shape[0]
+    p, n, sizes, family = np.empty(groups), np.empty(groups), np.empty(groups), np.empty((many, groups))
+    group_means(power, starts, p)
+    group_means(noise, starts, n)
+    for g in range(groups):
+        sizes[g] = (starts[g + 1] if g + 1 < groups else power.shape[0]) - starts[g]
+    for m in range(many):
+        group_means(shapes[m], starts, family[m])
+    best, amplitude = _best_shape(p, n, family, sizes, looks)
+    for f in range(power.shape[0]):
+        out[f] = amplitude * shapes[best, f]
 
 
 @kernel
@@ -118,6 +149,44 @@ def _best_shape(p: Array, n: Array, shapes: Array, sizes: Array, looks: float) -
         if cost < least:
             best, best_amplitude, least = m, amplitude, cost
     return best, best_amplitude
+
+
+@kernel
+def smooth_spectra(
+    power: Plane, pairs: Array, rows: Array, frames: int, shapes: Array, starts: Index, out: Array
+) -> None:
+    """Smooth texture, smooth noise and raw coherent power per row and frame of every class.
+
+    Parameters
+    ----------
+    power
+        Sums of squares over rows and frames, shape (c, f).
+    pairs
+        Sums of the pair products at the positions of the wall, shape (c, f).
+    rows
+        Number of rows, shape (c,).
+    frames
+        Number of frames.
+    shapes, starts
+        See :func:`texture_power`.
+    out
+        Texture, noise and coherent power less its noise, shape (3, c, f).
+    """
+    count = power.shape[1]
+    coherent, other, share = np.empty(count), np.empty(count), np.empty(count)
+    for c in range(power.shape[0]):
+        mean = 0.0
+        for f in range(count):
+            mean_power = power[c, f] / (frames * rows[c])
+            coherent[f] = mean_power / frames + 2.0 * pairs[c, f] / (frames * frames * rows[c])
+            other[f] = (mean_power - coherent[f]) * frames / (frames - 1)
+            mean += mean_power
+        noise = out[1, c]
+        smooth_noise(other, NOISE_FLOOR * mean / count + TINY, noise)
+        for f in range(count):
+            share[f] = noise[f] / frames
+            out[2, c, f] = coherent[f] - share[f]
+        texture_power(coherent, share, rows[c], shapes, starts, out[0, c])
 
 
 def matched_weight(texture: Array, noise: Array, frames: int) -> Array:

@@ -8,65 +8,91 @@ import cv2
 import numpy as np
 import pytest
 
-from axialnav.estimators.layout import STRIPS, RowLayout, haar_rows
-from axialnav.estimators.positions import coherent_power, motion_basis, position_scores
-from axialnav.estimators.rows import LEVEL_BANDS, bin_columns, bin_rows, fast_length
-from axialnav.estimators.search import lag_sums, profiles
-from axialnav.estimators.spectrum import Band, pair_count, pair_frames, pair_products, power, row_spectra
+from axialnav.estimators.extra import extra_step
+from axialnav.estimators.layout import BANDS, STRIPS, RowLayout, binned_coefficients, remove_level
+from axialnav.estimators.occlusion import OccluderFinder
+from axialnav.estimators.positions import climb, coherent_power, free_positions, motion_basis, position_scores
+from axialnav.estimators.rows import bin_columns, fast_length, row_sums, sum_rows
+from axialnav.estimators.search import LagTransform
+from axialnav.estimators.spectrum import Band, add_power, pair_count, pair_frames, pair_products, row_spectra
+from axialnav.estimators.texture import group_starts, shape_family, smooth_noise, texture_power
 from axialnav.estimators.window import FrameWindow
 from tests.estimators.scenes import texture
 
 FRAMES = 4
 
 
+def _coefficients(frame: np.ndarray, layout: RowLayout, height: int, first_row: int = 0) -> np.ndarray:
+    out = np.full((layout.used, frame.shape[1]), np.nan, dtype=np.float32)
+    sums, work = row_sums(frame.shape[1], height, frame.dtype), np.zeros((1 << layout.levels, frame.shape[1]))
+    binned_coefficients(frame, first_row, height, layout.levels, layout.place, sums, work.astype(np.float32), out)
+    return out
+
+
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_binned_rows_are_sums_without_the_median_level_of_five_bands(dtype: type) -> None:
-    frame = np.random.default_rng(1).integers(0, 255, (60, 40)).astype(dtype)
-    out = np.empty((20, 40), dtype=np.float32)
-    bin_rows(frame, 0, 3, out)
-    sums = frame.reshape(20, 3, 40).sum(axis=1).astype(np.float64)
-    level = np.median(sums.reshape(LEVEL_BANDS, -1, 40).mean(axis=1), axis=0)
-    np.testing.assert_allclose(out, sums - level, atol=1e-3)
+def test_coefficients_are_haars_of_row_sums(dtype: type) -> None:
+    """Brute force: an orthonormal matrix on blocks of binned rows."""
+    frame = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (180, 40)).astype(dtype)
+    layout = RowLayout(60)
+    haar = np.array([[1.0]])
+    for _ in range(layout.levels):
+        fine = np.kron(np.eye(len(haar)), [1.0, -1.0])
+        haar = np.concatenate([np.kron(haar, [1.0, 1.0]), fine]) / np.sqrt(2.0)
+    blocks = frame.reshape(60, 3, 40).sum(axis=1)[: layout.used].reshape(-1, len(haar), 40)
+    expected = np.einsum("ij,bjc->bic", haar, blocks).reshape(-1, 40)
+    np.testing.assert_allclose(_coefficients(frame, layout, 3)[layout.place], expected, rtol=1e-5, atol=1e-2)
+
+
+def test_the_level_of_a_column_is_the_median_of_five_bands() -> None:
+    layout = RowLayout(60)
+    rows = np.random.default_rng(1).normal(size=(layout.used, 40)).astype(np.float32)
+    smooth = [np.arange(first, end) for first, end in layout.smooth]
+    bands = [rows[np.concatenate(smooth[k : k + 2])].mean(axis=0) for k in range(0, STRIPS, STRIPS // BANDS)]
+    expected = rows.copy()
+    expected[np.concatenate(smooth)] -= np.median(bands, axis=0)
+    remove_level(rows, layout.smooth, np.empty((BANDS, 40), dtype=np.float32))
+    np.testing.assert_allclose(rows, expected, atol=1e-5)
 
 
 def test_an_object_in_one_band_leaves_the_other_rows_alone() -> None:
     """GIVEN a bright block in the lowest fifth WHEN columns are levelled THEN rows above do not see it."""
-    frame = np.full((100, 50), 90, dtype=np.uint8)
-    frame[85:, 10:20] = 200
-    out = np.empty((50, 50), dtype=np.float32)
-    bin_rows(frame, 0, 2, out)
-    assert np.abs(out[:40]).max() == 0.0
-    assert out[-1, 15] == 220.0
+    frame = np.full((160, 50), 90, dtype=np.uint8)
+    frame[140:, 10:20] = 200
+    layout = RowLayout(80)
+    out = _coefficients(frame, layout, 2)
+    remove_level(out, layout.smooth, np.empty((BANDS, 50), dtype=np.float32))
+    last_band = layout.strip_edges[STRIPS - STRIPS // BANDS]
+    assert np.abs(out[:last_band]).max() == 0.0
+    assert np.abs(out[last_band:, 15]).max() > 100.0
 
 
 def test_rows_outside_the_frame_repeat_its_border() -> None:
     frame = texture(40, 64, 0)
-    out = np.empty((10, 64), dtype=np.float32)
-    bin_rows(frame, 20, 4, out)
-    assert np.abs(np.diff(out[5:], axis=0)).max() == 0.0
+    out, sums = np.empty(64, dtype=np.float32), row_sums(64, 4, frame.dtype)
+    sum_rows(frame, 38, 4, sums, out)
+    np.testing.assert_array_equal(out, frame[38].astype(float) + 3.0 * frame[39])
+    sum_rows(frame, -2, 4, sums, out)
+    np.testing.assert_array_equal(out, 3.0 * frame[0].astype(float) + frame[1])
 
 
 def test_binned_columns_are_sums_about_their_mean() -> None:
     frame = texture(48, 90, 2)
     out = np.empty((5, 48), dtype=np.float32)
-    bin_columns(frame, 3, 4, 10, out)
-    sums = np.array([frame[:, 3 + 10 * c : 7 + 10 * c].sum(axis=1) for c in range(5)], dtype=np.float64)
+    bin_columns(frame, 3, 10, out)
+    sums = np.array([frame[:, 3 + 10 * c : 11 + 10 * c].sum(axis=1) for c in range(5)], dtype=np.float64)
     np.testing.assert_allclose(out, sums - sums.mean(axis=1, keepdims=True), atol=0.05)
 
 
 @pytest.mark.parametrize("rows", [17, 45, 100, 270])
-def test_the_haar_layout_is_orthonormal_and_keeps_strips_apart(rows: int) -> None:
+def test_the_layout_keeps_strips_and_classes_apart(rows: int) -> None:
     layout = RowLayout(rows)
-    data = np.random.default_rng(3).standard_normal((layout.used, 7)).astype(np.float32)
-    out = np.full_like(data, np.nan)
-    haar_rows(data, layout.levels, layout.place, np.empty((1 << layout.levels, 7), dtype=np.float32), out)
-    assert np.sum(out**2) == pytest.approx(np.sum(data**2), rel=1e-5)
     assert sorted(layout.place.tolist()) == list(range(layout.used))
     assert layout.count.sum() == layout.used
     assert layout.count.shape == (STRIPS, layout.classes)
-    if layout.levels:
-        size = 1 << layout.levels
-        np.testing.assert_allclose(out[layout.place[0]], data[:size].sum(axis=0) / np.sqrt(size), rtol=1e-4, atol=1e-5)
+    coarse = layout.coarse_count.shape[1]
+    np.testing.assert_array_equal(layout.coarse_count, layout.count[:, :coarse].reshape(BANDS, -1, coarse).sum(axis=1))
+    assert len(set(layout.coarse_rows.tolist())) == layout.coarse_edges[-1] == layout.coarse_count.sum()
+    np.testing.assert_array_equal(np.diff(layout.smooth, axis=1)[:, 0], layout.count[:, 0])
 
 
 def _spectra(seed: int) -> tuple[np.ndarray, np.ndarray, Band]:
@@ -93,8 +119,8 @@ def test_pair_products_and_power_are_the_sums_they_claim() -> None:
     pair_products(re[0], im[0], re[1], im[1], edges, out[0], out[1])
     expected = [(a * b.conj())[i:j].sum(axis=0) for i, j in pairwise(edges)]
     np.testing.assert_allclose(out[0] + 1j * out[1], expected, atol=1e-3)
-    squares = np.empty((4, band.count), dtype=np.float32)
-    power(re[0], im[0], edges, squares)
+    squares = np.zeros((4, band.count), dtype=np.float32)
+    add_power(re[0], im[0], edges, squares)
     np.testing.assert_allclose(squares.sum(axis=0), (np.abs(a) ** 2).sum(axis=0), rtol=1e-4)
 
 
@@ -111,6 +137,14 @@ def _weighted_products(re: np.ndarray, im: np.ndarray, weight: np.ndarray) -> tu
     return stacked.real.astype(np.float32), stacked.imag.astype(np.float32)
 
 
+def _ring(planes: np.ndarray) -> np.ndarray:
+    """Products by pair (1, p, f) as products by slots (n, n, 1, f)."""
+    ring = np.zeros((FRAMES, FRAMES, 1, planes.shape[-1]), dtype=np.float32)
+    for p, (i, j) in enumerate(pair_frames(FRAMES)):
+        ring[i, j, 0] = planes[0, p]
+    return ring
+
+
 def test_score_and_information_are_derivatives_of_the_brute_force_likelihood() -> None:
     re, im, band = _spectra(6)
     omega, rng = 2.0 * np.pi * band.frequency(), np.random.default_rng(7)
@@ -118,7 +152,8 @@ def test_score_and_information_are_derivatives_of_the_brute_force_likelihood() -
     p_re, p_im = _weighted_products(re, im, weight)
     score, information = np.empty((1, FRAMES)), np.empty((1, FRAMES, FRAMES))
     coherence = np.empty((1, pair_count(FRAMES)))
-    position_scores(p_re, p_im, omega, x, score, information, coherence)
+    one = np.ones((1, band.count), dtype=np.float32)
+    position_scores(p_re[None], p_im[None], one, omega, x, score, information, coherence)
 
     def value(at: np.ndarray) -> float:
         return _likelihood(re, im, omega, weight, at)
@@ -150,7 +185,8 @@ def test_coherent_power_and_the_search_agree_with_brute_force() -> None:
     omega, weight = 2.0 * np.pi * band.frequency(), np.ones(band.count)
     p_re, p_im = _weighted_products(re, im, weight)
     grid = np.arange(-3.0, 3.1, 0.5)  # on the samples of the transform: no interpolation error
-    found = profiles(lag_sums(p_re, p_im, FRAMES), band, grid, np.ones(1))
+    search = LagTransform(1, FRAMES, band)
+    found = search.profiles(_ring(p_re), _ring(p_im), np.arange(FRAMES), weight[None], grid, np.ones(1))
     brute = [_likelihood(re, im, omega, weight, d * np.arange(FRAMES)) for d in grid]
     np.testing.assert_allclose(found.gain[0], brute, rtol=1e-3, atol=1e-3 * np.abs(brute).max())
     out = np.empty((1, band.count))
@@ -179,5 +215,63 @@ def test_the_ring_gives_the_same_products_whatever_was_in_it_before() -> None:
         fresh.push(frame)
     for frame in frames:
         used.push(frame)
-    np.testing.assert_array_equal(fresh.fixed().re, used.fixed().re)
+    grid = np.arange(-5.0, 5.0, 0.25)
+    np.testing.assert_array_equal(*(w.coarse.profiles(w.order, grid).gain for w in (fresh, used)))
     np.testing.assert_array_equal(fresh.following(2.0).im, used.following(2.0).im)
+
+
+@pytest.mark.parametrize("accelerated", [False, True])
+def test_the_climb_ends_at_the_top_of_the_brute_force_likelihood(accelerated: bool) -> None:
+    band, rng = Band(128), np.random.default_rng(9)
+    omega, x = band.omega(), motion_basis(FRAMES, accelerated) @ np.array([0.31, -0.2][: 1 + accelerated])
+    wall = rng.standard_normal((2, 30, band.count)) @ np.diag(1.0 / (1.0 + np.arange(band.count)))
+    y = (wall[0] + 1j * wall[1]) * np.exp(-1j * omega * x[:, None, None])
+    y += 0.02 * (rng.standard_normal(y.shape) + 1j * rng.standard_normal(y.shape))
+    p_re, p_im = _weighted_products(y.real, y.imag, np.ones(band.count))
+    basis, one = motion_basis(FRAMES, accelerated), np.ones((1, band.count), dtype=np.float32)
+    motion = np.zeros(1 + accelerated)
+    assert climb(p_re, p_im, one, omega, basis, np.zeros(FRAMES), motion, np.array([0.3, 1e-6, 20.0]))
+
+    def value(at: np.ndarray) -> float:
+        return _likelihood(y.real, y.imag, omega, np.ones(band.count), basis @ at)
+
+    for step in 0.003 * np.vstack([np.eye(len(motion)), -np.eye(len(motion))]):
+        assert value(motion + step) < value(motion)
+
+
+def test_extra_parameters_step_as_the_dense_solution_says() -> None:
+    rng = np.random.default_rng(10)
+    strips, known, free = 4, motion_basis(5, False), free_positions(5, 0)
+    root = rng.normal(size=(strips, 5, 5))
+    information, score = np.einsum("sij,skj->sik", root, root), rng.normal(size=(strips, 5))
+    height, step = np.linspace(-1.0, 1.0, strips), np.zeros(4)
+    chi2 = extra_step(score, information, height, known, free, step)
+    designs = [np.hstack([known, h * free]) for h in height]
+    J = sum(d.T @ i @ d for d, i in zip(designs, information, strict=True))
+    g = sum(d.T @ s for d, s in zip(designs, score, strict=True))
+    solved, covariance = np.linalg.solve(J, g), np.linalg.inv(J)
+    np.testing.assert_allclose(step, solved[1:], rtol=1e-9)
+    assert chi2 == pytest.approx(float(solved[1:] @ np.linalg.solve(covariance[1:, 1:], solved[1:])))
+
+
+def test_smooth_noise_and_texture_find_what_made_the_power() -> None:
+    band, rng = Band(512), np.random.default_rng(11)
+    shapes, starts = shape_family(band.first, band.count, band.length), group_starts(band.count)
+    truth, noise = 40.0 * shapes[9], np.full(band.count, 2.0)
+    power = (truth + noise) * rng.gamma(100.0, 0.01, band.count)
+    found, level = np.empty(band.count), np.empty(band.count)
+    texture_power(power, noise, 100.0, shapes, starts, found)
+    np.testing.assert_allclose(found, truth, rtol=0.1)
+    smooth_noise(noise * rng.gamma(100.0, 0.01, band.count), 0.0, level)
+    np.testing.assert_allclose(level, noise, rtol=0.06)
+
+
+def test_an_object_that_stands_still_is_found_where_it_is() -> None:
+    rng = np.random.default_rng(12)
+    wall = rng.normal(size=(40, 300)).astype(np.float32)
+    planes = np.stack([wall[:, 3 * k : 3 * k + 256] for k in range(4)]) + rng.normal(size=(4, 40, 256))
+    planes[:, 8:12, 64:96] += 9.0 * np.sign(rng.normal(size=(4, 32)))
+    finder = OccluderFinder(256, np.arange(0, 41, 4))
+    hidden = finder.hidden(planes.astype(np.float32), np.arange(4), -3 * np.arange(4))
+    assert np.argwhere(hidden).tolist() == [[2, 4], [2, 5]]
+    assert not finder.hidden(planes.astype(np.float32), np.arange(4), np.zeros(4, dtype=np.int64)).any()
