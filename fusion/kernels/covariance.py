@@ -88,14 +88,16 @@ def project(P: Array, H: Array, PHt: Array) -> float:
 
 @kernel
 def correct(x: Array, P: Array, PHt: Array, S: float, innovation: float, gain: Array) -> None:
-    """Scalar Joseph update of nominal state ``x`` (19,) and covariance ``P`` in place; ``gain`` (18,) is scratch."""
+    """Scalar update of nominal state ``x`` (19,) and covariance ``P`` in place; ``gain`` (18,) is scratch.
+
+    With the gain ``P H' / S`` the Joseph form is ``P - K (P H')'`` but for terms that are rounding errors.
+    """
     for i in range(N):
         gain[i] = PHt[i] / S
     for i in range(N):
-        a = -gain[i]
-        b = S * gain[i] - PHt[i]
+        a = gain[i]
         for j in range(N):
-            P[i, j] += a * PHt[j] + b * gain[j]
+            P[i, j] -= a * PHt[j]
     inject(x, gain, innovation)
 
 

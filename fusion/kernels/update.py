@@ -76,7 +76,7 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     weight = redescend(nis / axes, s.soft_nis) if nis <= gate else 0.0
     w.row[LOG_NIS], w.row[LOG_GATE], w.row[LOG_WEIGHT] = nis, gate, weight
     if weight > MIN_WEIGHT:
-        _apply(axes, repeated / weight, x, P, w)
+        _apply(axes, repeated, repeated / weight, x, P, w)
         if row == 0:
             for k in range(3):
                 m.correction[k] += w.step[E_VEL + k]
@@ -98,12 +98,12 @@ def _note_refused(axes: int, repeated: float, cap: float, P: Array, m: Record, w
 def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, float]:
     """Normalised innovation squared of all axes jointly, and log det S, by one elimination pass."""
     S, y = w.S, w.y
-    for i in range(axes):
+    for i in range(axes - 1, -1, -1):  # the first axis last: the update begins with its P H'
         y[i] = w.z[i] - w.h[i]
         S[i, i] = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
         w.row[LOG_INNOVATION + i] = y[i]
         w.row[LOG_VARIANCE + i] = S[i, i]
-        for j in range(i + 1, axes):
+        for j in range(i):
             cross = 0.0
             for k in range(N_ERROR):
                 cross += w.H[j, k] * w.PHt[k]
@@ -123,12 +123,18 @@ def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, f
 
 
 @kernel
-def _apply(axes: int, inflation: float, x: Array, P: Array, w: Record) -> None:
-    """Fuse the axes one by one; each innovation is taken after the corrections before it (to first order)."""
+def _apply(axes: int, repeated: float, inflation: float, x: Array, P: Array, w: Record) -> None:
+    """Fuse the axes one by one; each innovation is taken after the corrections before it (to first order).
+
+    ``w.S`` and ``w.PHt`` are as :func:`_innovate` leaves them.
+    """
     for k in range(N_ERROR):
         w.step[k] = 0.0
     for i in range(axes):
-        S = project(P, w.H[i], w.PHt) + w.variance[i] * inflation
+        if i == 0:
+            S = w.S[0, 0] + w.variance[0] * (inflation - repeated)
+        else:
+            S = project(P, w.H[i], w.PHt) + w.variance[i] * inflation
         innovation = w.z[i] - w.h[i]
         for k in range(N_ERROR):
             innovation -= w.H[i, k] * w.step[k]

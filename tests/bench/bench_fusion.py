@@ -15,8 +15,9 @@ from axialnav.fusion.sources import Kind
 from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.sample_flights import sample_flight_path
 from tests.bench.flights import CASES, FLIGHTS, OBSTACLES
+from tests.bench.fusion_rows import DELAY_HEAD, GROWTH_HEAD, SOAK_HEAD, delay_rows, growth_rows, soak_row
 from tests.bench.markdown import machine, table
-from tests.bench.prepared import Prepared, halfway, one_kind, prepare, repeated
+from tests.bench.prepared import Prepared, halfway, one_kind, prepare
 from tests.bench.process_bench import HEAD as PROCESS_HEAD
 from tests.bench.process_bench import process_rows
 from tests.bench.timing import median_of
@@ -33,7 +34,6 @@ KERNEL_HEAD = (
     "asked [us]",
 )
 STEP_HEAD = ("step", "wall [us]", "processor [us]", "least [us]")
-GROWTH_HEAD = ("length of the flight", "steps", "wall [us/step]", "processor [us/step]", "least [us/step]")
 ASKED_US = 0.6
 STEPS = 20_000
 PUSHED = 20_000
@@ -50,14 +50,6 @@ def kernel_rows(flights: Sequence[Flight], repeats: int = REPEATS) -> Iterator[l
         real_time = float(stamps[-1] - stamps[0]) * 1e-9 / spent.wall_s
         name, events = flight.name, f"{len(stamps)}"
         yield [name, events, f"{steps}", *spent.per(steps), f"{real_time:.0f}", f"<= {ASKED_US}"]
-
-
-def growth_rows(prepared: Prepared, repeats: int = REPEATS) -> Iterator[list[str]]:
-    """Time per step of one flight flown again and again."""
-    for times in (1, 2, 4):
-        longer = prepared.with_events(repeated(prepared.events, times))
-        steps = longer.steps()
-        yield [f"{times}x", f"{steps}", *median_of(repeats, longer.run, longer.buffers).per(steps)]
 
 
 def kernel_step_rows(prepared: Prepared, count: int = STEPS) -> Iterator[list[str]]:
@@ -119,12 +111,23 @@ def push_rows(flight: Flight, count: int = PUSHED) -> Iterator[list[str]]:
         yield [f"CorridorEstimator.push, {name}", *spent.per(len(order))]
 
 
-def tables(flights: Sequence[Flight], main: Path, *, count: int = STEPS, pushed: int = PUSHED) -> Iterator[str]:
+def tables(
+    flights: Sequence[Flight],
+    main: Path,
+    *,
+    count: int = STEPS,
+    pushed: int = PUSHED,
+    hours: Sequence[float] = (1.0, 2.0, 4.0),
+    soak_h: float = 24.0,
+    seeds: Sequence[int] = (1, 2, 3),
+) -> Iterator[str]:
     """All tables but that of processes; ``main`` is the folder of the flight that is looked at closely."""
     close = next(flight for flight in flights if flight.path == main)
     prepared = prepare(close)
     yield "Whole flights through the kernel:\n\n" + table(KERNEL_HEAD, kernel_rows(flights))
-    yield f"Growth, {close.name}:\n\n" + table(GROWTH_HEAD, growth_rows(prepared))
+    yield "Growth, a simulated flight at 200 Hz:\n\n" + table(GROWTH_HEAD, growth_rows(hours))
+    yield "Soak, the same at 1 kHz:\n\n" + table(SOAK_HEAD, [soak_row(soak_h)])
+    yield "UWB that comes late, velocity as known at the time:\n\n" + table(DELAY_HEAD, delay_rows(seeds))
     steps = [*kernel_step_rows(prepared, count), *filterpy_rows(count // 10), *push_rows(close, pushed)]
     yield f"Single steps, {close.name}:\n\n" + table(STEP_HEAD, steps)
 

@@ -78,13 +78,6 @@ def prepare(flight: Flight) -> Prepared:
     return Prepared(config, events, sources, build_settings(config), memory)
 
 
-def repeated(events: Events, times: int) -> Events:
-    """The same events one after another, ``times`` over."""
-    span = int(events.t_ns[-1] - events.t_ns[0]) + 4_000_000
-    stamps = np.concatenate([events.t_ns + k * span for k in range(times)])
-    return Events(stamps, np.tile(events.source, times), np.tile(events.values, (times, 1)))
-
-
 def halfway(prepared: Prepared) -> Prepared:
     """The filter in the middle of the flight, before the other half of the events."""
     cut = len(prepared.events.t_ns) // 2

@@ -38,10 +38,19 @@ def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
 
 
 def test_the_speed_tables_have_a_positive_time_in_every_row() -> None:
-    whole, growth, single = bench_fusion.tables([load_flight(SAMPLE)], SAMPLE, count=200, pushed=300)
+    whole, growth, soak, late, single = bench_fusion.tables(
+        [load_flight(SAMPLE)], SAMPLE, count=200, pushed=300, hours=(0.02, 0.04), soak_h=0.02, seeds=(1,)
+    )
     (flight,) = cells(whole, SAMPLE.name)
     assert int(flight[2]) > int(flight[1]) > 4000  # more scalar updates than readings
-    assert [row[0] for row in cells(growth, "")[4:]] == ["1x", "2x", "4x"]
+    short, twice = cells(growth, "0.0")
+    assert int(twice[1]) == 2 * int(short[1])
+    (soaked,) = cells(soak, "0.02")
+    assert float(soaked[6]) < 1e-12
+    assert float(soaked[7]) > -1e-9
+    on_time, own_stamps, arrival = (float(row[2]) for row in cells(late, "on time") + cells(late, "0.35"))
+    assert (on_time, own_stamps < 1.1 < arrival) == (1.0, True)
     steps = [*cells(single, "kernel"), *cells(single, "filterpy"), *cells(single, "CorridorEstimator.push")]
     assert len(steps) == 7
-    assert all(float(value) > 0.0 for row in [flight, *steps] for value in row[-3:] if not value.startswith("<="))
+    for row in [*steps, flight[:1] + flight[3:6]]:
+        assert all(float(value) > 0.0 for value in row[1:4])
