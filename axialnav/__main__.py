@@ -1,12 +1,21 @@
-"""``axialnav`` and ``python -m axialnav``: the command line, where its libraries are installed."""
+"""``axialnav`` and ``python -m axialnav``: the command line, as much of it as is installed.
+
+The verbs that fly need the core alone; every other verb needs the ``replay`` extra.
+"""
 
 from __future__ import annotations
 
 import sys
 
+ON_BOARD = ("live", "camera")
+
 
 def main() -> int:
     """Run the command line and return its exit code; one line on stderr where the ``replay`` extra is missing."""
+    if sys.argv[1:2] and sys.argv[1] in ON_BOARD:
+        from axialnav.fusion.live.cli import main as on_board
+
+        return on_board(sys.argv[1:])
     try:
         from axialnav.replay import cli
     except KeyboardInterrupt:

@@ -10,17 +10,17 @@ Only the command line prints.  Verbs import what they need when they run, so tha
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Annotated, Any
 
-from cyclopts import App
+from cyclopts import App, Parameter
 from cyclopts.exceptions import CycloptsError
 
-from axialnav.fusion.errors import AxialnavError, ConfigError
+from axialnav.fusion.complaints import INTERRUPTED, PASSED, USAGE, complain, explain, shows_tracebacks
+from axialnav.fusion.live import cli as on_board
 from axialnav.replay.cli_check import check, compare
-from axialnav.replay.cli_output import complain, emit
+from axialnav.replay.cli_output import emit
 from axialnav.replay.cli_replay import demo, replay
 from axialnav.replay.cli_simulate import simulate
 from axialnav.replay.motion_cli import motion_command
@@ -33,8 +33,6 @@ VERBS: dict[str, Callable[..., int]] = {
     "check": check,
     "compare": compare,
 }
-PASSED, FAILED, USAGE, UNUSABLE, INTERRUPTED = 0, 1, 2, 3, 130
-DEBUG = "AXIALNAV_DEBUG"
 HELP = """Axial velocity of a UAV in a featureless tunnel, with an honest uncertainty.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage error, 3 nothing evaluated or input not usable.
@@ -59,7 +57,18 @@ def build_app() -> App:
     )
     for name, verb in VERBS.items():
         app.command(verb, name=name)
+    for name, purpose in on_board.VERBS.items():
+        app.command(_forward(name), name=name, help=purpose, help_flags=(), version_flags=())
     return app
+
+
+def _forward(verb: str) -> Callable[..., int]:
+    """A verb that flies, whose own parser needs none of the libraries of this one."""
+
+    def run(*words: Annotated[str, Parameter(allow_leading_hyphen=True)]) -> int:
+        return on_board.main([verb, *words])
+
+    return run
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -77,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain("interrupted; files written so far may be incomplete")
         return INTERRUPTED
     except Exception as error:  # the last line of defence: a person gets one line, not a traceback
-        if os.environ.get(DEBUG):
+        if shows_tracebacks():
             raise
         return _explain(error)
 
@@ -92,16 +101,9 @@ def _explain(error: Exception) -> int:
     if isinstance(error, CycloptsError):
         complain(f"{_usage_text(error)} See `axialnav --help`.")
         return USAGE
-    if isinstance(error, AxialnavError):
-        complain(str(error))
-        return USAGE if isinstance(error, ConfigError) else UNUSABLE
-    if isinstance(error, OSError):
-        complain(f"{error.filename or 'input'}: {error.strerror or error}")
-        return UNUSABLE
-    complain(
-        f"stopped by a defect of axialnav: {type(error).__name__}: {error}; {DEBUG}=1 shows where, please report it"
-    )
-    return UNUSABLE
+    text, code = explain(error)
+    complain(text)
+    return code
 
 
 def _usage_text(error: CycloptsError) -> str:

@@ -1,4 +1,4 @@
-"""How the command line speaks: results on stdout, one-line complaints and progress on stderr."""
+"""How the command line speaks: results on stdout, progress on stderr."""
 
 from __future__ import annotations
 
@@ -17,11 +17,6 @@ def emit(text: str | None = None) -> None:
     except BrokenPipeError:
         # Python flushes stdout once more at exit: give it somewhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def complain(text: str) -> None:
-    """Print one line on stderr, whatever ``text`` contains."""
-    print(f"axialnav: {' '.join(text.split())}", file=sys.stderr)
 
 
 @contextmanager

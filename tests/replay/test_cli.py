@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from axialnav.fusion import complaints
 from axialnav.replay import cli, cli_replay
-from axialnav.replay.cli_output import complain, progress_bar
+from axialnav.replay.cli_output import progress_bar
 
 NOWHERE = "/nowhere/at/all"
 
@@ -99,7 +100,7 @@ def test_the_unforeseen_is_one_line_too(
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.delenv(cli.DEBUG, raising=False)
+    monkeypatch.delenv(complaints.DEBUG, raising=False)
     monkeypatch.setattr(cli_replay, "_refuse_flight_folder", fail)
     assert cli.main(["demo"]) == code
     captured = capsys.readouterr().err
@@ -108,7 +109,7 @@ def test_the_unforeseen_is_one_line_too(
 
 
 def test_the_traceback_is_there_for_whoever_asks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(cli.DEBUG, "1")
+    monkeypatch.setenv(complaints.DEBUG, "1")
     monkeypatch.setattr(cli_replay, "_refuse_flight_folder", lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         cli.main(["demo"])
@@ -122,7 +123,7 @@ def test_a_run_is_never_written_over_a_recording(tmp_path: Path, capsys: pytest.
 
 
 def test_complaints_stay_on_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    complain("first\nsecond\r\n\tthird")
+    complaints.complain("first\nsecond\r\n\tthird")
     assert capsys.readouterr().err == "axialnav: first second third\n"
 
 

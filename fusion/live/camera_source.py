@@ -1,0 +1,256 @@
+"""Pictures with honest stamps from a V4L2 camera, a video file or a folder: one interface, one clock.
+
+V4L2 stamps its buffers with the monotonic clock when the exposure starts (UVC) or when the frame ends (most MIPI
+drivers); the stamp is taken from there and not from the moment of reading, which is 30 to 130 ms later and jitters.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.errors import ConfigError
+from axialnav.fusion.live.vehicle import CameraInput
+from axialnav.models.rig import Camera
+
+Image = NDArray[np.generic]
+PICTURES = {".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff"}
+EXPOSURE_UNIT_S = 1e-4
+MANUAL = 1.0
+EXPOSURE_TOLERANCE = 0.1  # sensors round to whole lines
+SETTLING_FRAMES = 5  # settings take effect some frames later
+PLAUSIBLE_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One picture: middle of its exposure and time of arrival [ns], exposure [s] if it is known."""
+
+    t_ns: int
+    arrival_ns: int
+    image: Image
+    exposure_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One thing that was set, and what the driver says it is now."""
+
+    name: str
+    wanted: str
+    got: str
+    good: bool
+
+
+class Source(Protocol):
+    """Where pictures come from."""
+
+    settings: list[Setting]
+    stamps_by_arrival: int
+
+    def pictures(self) -> Iterator[Picture | None]:
+        """Pictures as they come; None where one could not be read."""
+
+    def close(self) -> None:
+        """Release the camera."""
+
+
+def open_source(
+    camera: CameraInput, spec: Camera, clock: Callable[[], int], sleep: Callable[[float], None] = time.sleep
+) -> Source:
+    """Open what ``camera.source`` names: ``/dev/videoN``, a folder or a video file.
+
+    Raises
+    ------
+    ConfigError
+        Nothing is there, it cannot be opened, or the camera will not take the settings.
+    """
+    path = Path(camera.source)
+    if camera.source.startswith("/dev/"):
+        capture = cv2.VideoCapture(camera.source, cv2.CAP_V4L2)
+        if not capture.isOpened():
+            raise ConfigError(f"camera.source {camera.source}: no camera there, or another program has it")
+        return V4l2Source(capture, camera, spec, clock)
+    if path.is_dir():
+        return FolderSource(path, camera, spec, clock, sleep)
+    if path.is_file():
+        return VideoSource(path, camera, spec, clock, sleep)
+    raise ConfigError(f"camera.source {camera.source}: neither a device nor a file nor a folder; check the path")
+
+
+class V4l2Source:
+    """A camera through OpenCV's V4L2 backend, its exposure locked and read back.
+
+    ``capture`` is an opened ``cv2.VideoCapture``.
+
+    Raises
+    ------
+    ConfigError
+        The camera does not do what it was told: picture size, or exposure where one is asked for.
+    """
+
+    def __init__(self, capture: Any, camera: CameraInput, spec: Camera, clock: Callable[[], int]) -> None:
+        self.settings: list[Setting] = []
+        self.stamps_by_arrival = 0
+        self._capture, self._camera, self._clock = capture, camera, clock
+        self._readout_s = spec.readout_s or 0.0
+        self._exposure_s: float | None = None
+        try:
+            self._configure(spec)
+        except ConfigError:
+            capture.release()
+            raise
+
+    def _configure(self, spec: Camera) -> None:
+        camera = self._camera
+        if camera.fourcc is not None:
+            code = cv2.VideoWriter.fourcc(*camera.fourcc)
+            self._set("pixel format", cv2.CAP_PROP_FOURCC, code, must=False)
+        self._set("width", cv2.CAP_PROP_FRAME_WIDTH, spec.resolution[0], must=True)
+        self._set("height", cv2.CAP_PROP_FRAME_HEIGHT, spec.resolution[1], must=True)
+        if spec.rate_hz:
+            self._set("rate [Hz]", cv2.CAP_PROP_FPS, spec.rate_hz, must=False)
+        self._set("buffers", cv2.CAP_PROP_BUFFERSIZE, 2, must=False)
+        if camera.gain is not None:
+            self._set("gain", cv2.CAP_PROP_GAIN, camera.gain, must=False)
+        if camera.exposure_s is None:
+            self.settings.append(Setting("exposure [s]", "automatic", "not known", good=False))
+            return
+        self._set("manual exposure", cv2.CAP_PROP_AUTO_EXPOSURE, MANUAL, must=True)
+        wanted = camera.exposure_s / EXPOSURE_UNIT_S
+        got = self._set("exposure [0.1 ms]", cv2.CAP_PROP_EXPOSURE, wanted, must=True, tolerance=EXPOSURE_TOLERANCE)
+        self._exposure_s = got * EXPOSURE_UNIT_S
+
+    def _set(self, name: str, key: int, wanted: float, *, must: bool, tolerance: float = 0.0) -> float:
+        taken = bool(self._capture.set(key, wanted))
+        got = float(self._capture.get(key))
+        good = taken and abs(got - wanted) <= tolerance * abs(wanted) + 1e-6
+        self.settings.append(Setting(name, f"{wanted:g}", f"{got:g}", good))
+        if must and not good:
+            raise ConfigError(
+                f"camera {self._camera.source}: {name} was set to {wanted:g}, the driver says {got:g}; "
+                f"`v4l2-ctl --list-ctrls-menus --list-formats-ext` shows what it can do"
+            )
+        return got
+
+    def pictures(self) -> Iterator[Picture | None]:
+        """Pictures for ever, after the first few, which are taken before the settings have settled."""
+        number = 0
+        while True:
+            if not self._capture.grab():
+                yield None
+                continue
+            arrival = self._clock()
+            stamp_ns = self._stamp(arrival)
+            good, image = self._capture.retrieve()
+            number += 1
+            if number <= SETTLING_FRAMES:
+                continue
+            yield Picture(self._middle(stamp_ns), arrival, np.asarray(image), self._exposure_s) if good else None
+
+    def _stamp(self, arrival_ns: int) -> int:
+        stamp_ns = round(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
+        if 0 <= arrival_ns - stamp_ns < PLAUSIBLE_S * 1e9:
+            return stamp_ns
+        self.stamps_by_arrival += 1
+        return arrival_ns
+
+    def _middle(self, stamp_ns: int) -> int:
+        half = round(0.5e9 * ((self._exposure_s or 0.0) + self._readout_s))
+        return stamp_ns + half if self._camera.stamp == "start" else stamp_ns - half
+
+    def close(self) -> None:
+        """Release the device."""
+        self._capture.release()
+
+
+class _Recorded:
+    """Pictures that were taken earlier, played at the pace of their stamps from now on."""
+
+    def __init__(
+        self, camera: CameraInput, spec: Camera, clock: Callable[[], int], sleep: Callable[[float], None]
+    ) -> None:
+        exposure = camera.exposure_s or spec.exposure_s
+        told = f"{exposure:g}" if exposure else "not known"
+        self.settings = [Setting("exposure [s]", "as recorded", told, good=exposure is not None)]
+        self.stamps_by_arrival = 0
+        self._exposure_s, self._clock, self._sleep = exposure, clock, sleep
+
+    def _recorded(self) -> Iterator[tuple[int, Image | None]]:
+        """Stamps [ns] of the recording and pictures."""
+        yield from ()
+
+    def pictures(self) -> Iterator[Picture | None]:
+        """Pictures until the recording ends."""
+        first: int | None = None
+        began = self._clock()
+        for stamp, image in self._recorded():
+            first = stamp if first is None else first
+            due = began + stamp - first
+            wait_s = (due - self._clock()) * 1e-9
+            if wait_s > 0.0:
+                self._sleep(wait_s)
+            yield Picture(due, self._clock(), image, self._exposure_s) if image is not None else None
+
+    def close(self) -> None:
+        """Nothing is held open between pictures."""
+
+
+class FolderSource(_Recorded):
+    """A folder of pictures: stamps from names in nanoseconds, or from the camera's rate."""
+
+    def __init__(
+        self,
+        folder: Path,
+        camera: CameraInput,
+        spec: Camera,
+        clock: Callable[[], int],
+        sleep: Callable[[float], None],
+    ) -> None:
+        super().__init__(camera, spec, clock, sleep)
+        self._files = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES)
+        self._named = bool(self._files) and all(p.stem.isdigit() and len(p.stem) >= 9 for p in self._files)
+        if not self._files:
+            raise ConfigError(f"camera.source {folder}: no pictures in it; PNG, JPEG, PGM, BMP and TIFF are read")
+        if not self._named and not spec.rate_hz:
+            raise ConfigError(f"camera.source {folder}: names are not stamps in ns; set rate_hz of the camera")
+        self._period_ns = round(1e9 / spec.rate_hz) if spec.rate_hz else 0
+
+    def _recorded(self) -> Iterator[tuple[int, Image | None]]:
+        for number, path in enumerate(self._files):
+            stamp = int(path.stem) if self._named else number * self._period_ns
+            yield stamp, cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+
+
+class VideoSource(_Recorded):
+    """A video file, with the stamps of its container."""
+
+    def __init__(
+        self,
+        path: Path,
+        camera: CameraInput,
+        spec: Camera,
+        clock: Callable[[], int],
+        sleep: Callable[[float], None],
+    ) -> None:
+        super().__init__(camera, spec, clock, sleep)
+        self._video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        if not self._video.isOpened():
+            raise ConfigError(f"camera.source {path}: not a video that can be read")
+
+    def _recorded(self) -> Iterator[tuple[int, Image | None]]:
+        while self._video.grab():
+            stamp = round(float(self._video.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
+            good, image = self._video.retrieve()
+            yield stamp, image if good else None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._video.release()

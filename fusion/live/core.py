@@ -1,0 +1,168 @@
+"""The filter in one place: readings in from one thread, states out to any."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.axial_estimator import AxialEstimator
+from axialnav.fusion.config import Config
+from axialnav.fusion.corridor import CorridorEstimator, NotStartedError, PastStateError
+from axialnav.fusion.errors import FlightError, ReadingError
+from axialnav.fusion.memory import the_imu
+from axialnav.fusion.outcome import AxialState, Outcome, Verdict
+from axialnav.fusion.readings import ImuSample, Reading
+
+MAX_GAP_NS = 1_000_000_000  # without inertial samples for longer, nobody knows where the vehicle is
+MAX_SPEED_M_S = 100.0
+LONG_AGO_NS = -(2**62)
+LOCK_S = 0.05
+ESTIMATORS: dict[str, type[CorridorEstimator]] = {"corridor": CorridorEstimator, "axial": AxialEstimator}
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The estimate carried forward to ``state.t_ns``, and how fresh it is.
+
+    Attributes
+    ----------
+    state
+        Estimate.
+    rate_rad_s
+        Latest angular rate in body axes, bias removed, shape (3,).
+    imu_ns
+        Stamp of the newest inertial sample.
+    aid_ns
+        Arrival of the latest reading that was fused.
+    restarts
+        How often the filter has been started again.
+    """
+
+    state: AxialState
+    rate_rad_s: NDArray[np.float64]
+    imu_ns: int
+    aid_ns: int
+    restarts: int
+
+
+class Tap(Protocol):
+    """Who wants to know what the filter saw (the recorder)."""
+
+    def restarted(self, config: Config) -> None:
+        """The filter starts anew with ``config``; what follows belongs to the new one."""
+
+    def pushed(self, reading: Reading, outcome: Outcome, arrival_ns: int) -> None:
+        """One reading went into the filter."""
+
+
+class FilterCore:
+    """Owns the estimator; starts it anew where its past is of no use.
+
+    Parameters
+    ----------
+    make_config
+        Configuration for the next estimator (the noise depends on which inertial messages come).
+    kind
+        ``"corridor"`` or ``"axial"``.
+    tap
+        Told of everything that goes in.
+
+    Attributes
+    ----------
+    verdicts
+        Sensor and verdict -> count.
+    refused
+        Reason -> readings that the filter did not take.
+    restarts
+        Reason -> how often the filter was started anew.
+    """
+
+    def __init__(self, make_config: Callable[[], Config], kind: str = "corridor", tap: Tap | None = None) -> None:
+        self.verdicts: Counter[tuple[str, str]] = Counter()
+        self.refused: Counter[str] = Counter()
+        self.restarts: Counter[str] = Counter()
+        self._make_config, self._kind, self._tap = make_config, kind, tap
+        self._lock = threading.Lock()
+        self._imu: ImuSample | None = None
+        self._aid_ns = LONG_AGO_NS
+        self._count = 0
+        self._sick = False
+        self._estimator = self._new()
+
+    def _new(self) -> CorridorEstimator:
+        config = self._make_config()
+        if self._tap is not None:
+            self._tap.restarted(config)
+        self._rotation_BS = the_imu(config).rotation_BS
+        return ESTIMATORS[self._kind](config)
+
+    def push(self, reading: Reading, arrival_ns: int) -> Outcome | None:
+        """Take one reading; None if the filter would not have it.  From one thread only."""
+        with self._lock:
+            self._watch(reading)
+            try:
+                outcome = self._estimator.push(reading)
+            except ReadingError:
+                self.refused[f"{reading.sensor}: not a reading of a configured sensor"] += 1
+                return None
+            except FlightError as error:
+                self._restart(f"cannot start: {error}")
+                return None
+            if isinstance(reading, ImuSample):
+                if self._imu is None or reading.t_ns > self._imu.t_ns:
+                    self._imu = reading
+            elif outcome.verdict is Verdict.FUSED:
+                self._aid_ns = arrival_ns
+        self.verdicts[reading.sensor, outcome.verdict.name] += 1
+        if self._tap is not None:
+            self._tap.pushed(reading, outcome, arrival_ns)
+        return outcome
+
+    def restart(self, reason: str) -> None:
+        """Start anew, for example because the autopilot did; from the thread that pushes."""
+        with self._lock:
+            self._restart(reason)
+
+    def snapshot(self, now_ns: int) -> Snapshot | None:
+        """The estimate carried forward to ``now_ns``; None while there is none or the filter is stuck."""
+        if not self._lock.acquire(timeout=LOCK_S):
+            return None
+        try:
+            if self._imu is None:
+                return None
+            state = self._estimator.state(max(now_ns, self._imu.t_ns))
+            if not _is_sane(state):
+                self._sick = True  # the thread that pushes starts it anew
+                return None
+            rate = self._rotation_BS @ np.array(self._imu.gyro_rad_s) - state.gyro_bias_rad_s
+            return Snapshot(state, rate, self._imu.t_ns, self._aid_ns, self._count)
+        except (NotStartedError, PastStateError):
+            return None
+        finally:
+            self._lock.release()
+
+    def _watch(self, reading: Reading) -> None:
+        if self._sick:
+            self._restart("the estimate ran away")
+        newest = self._imu
+        if isinstance(reading, ImuSample) and newest is not None and reading.t_ns - newest.t_ns > MAX_GAP_NS:
+            self._restart("no inertial samples for more than 1 s")
+
+    def _restart(self, reason: str) -> None:
+        self._sick = False
+        self.restarts[reason] += 1
+        self._count += 1
+        self._imu, self._aid_ns = None, LONG_AGO_NS
+        self._estimator = self._new()
+
+
+def _is_sane(state: AxialState) -> bool:
+    numbers = (state.position_m, state.velocity_m_s, state.quaternion_WB, state.covariance)
+    finite = all(bool(np.isfinite(n).all()) for n in numbers)
+    return finite and float(np.abs(state.velocity_m_s).max()) < MAX_SPEED_M_S

@@ -1,0 +1,285 @@
+"""The node: one thread per wire, one for the filter, one to speak; bounded ways between them; a clean end."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from axialnav.fusion.live.autopilot import Autopilot
+from axialnav.fusion.live.camera import Grabber, MotionStage
+from axialnav.fusion.live.camera_source import Picture, Source
+from axialnav.fusion.live.core import FilterCore
+from axialnav.fusion.live.latency import Latency
+from axialnav.fusion.live.mailbox import BoundedQueue
+from axialnav.fusion.live.nooploop_stage import NooploopStage
+from axialnav.fusion.live.output import SENDING, Output
+from axialnav.fusion.live.receiver import Receiver
+from axialnav.fusion.live.recording import FlightRecording
+from axialnav.fusion.live.security import read_key
+from axialnav.fusion.live.sender import Sender
+from axialnav.fusion.live.status import StatusServer, status_line
+from axialnav.fusion.live.transport import Link, open_link
+from axialnav.fusion.live.vehicle import Vehicle
+from axialnav.fusion.outcome import Verdict
+from axialnav.fusion.readings import PixelMotion, Reading
+
+CAPACITY = 2048  # readings: several seconds of everything
+TICK_S = 0.02
+JOIN_S = 2.0
+
+
+class Item(NamedTuple):
+    """Something on its way to the filter: a reading, or the order to start anew."""
+
+    reading: Reading | None
+    restart: str
+    arrival_ns: int
+    picture_ns: int | None
+
+
+class Node:
+    """Everything between the wires of one vehicle.
+
+    Parameters
+    ----------
+    vehicle
+        What to do.
+    link, source
+        The link to the autopilot and the camera; opened from ``vehicle`` if not given.
+    clock
+        The one monotonic clock [ns].
+    say
+        Takes lines for a person.
+    recording
+        Records the flight; None: nothing is recorded.
+
+    Raises
+    ------
+    ConfigError
+        A port, key or camera cannot be used.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        *,
+        link: Link | None = None,
+        source: Source | None = None,
+        clock: Callable[[], int] = time.monotonic_ns,
+        say: Callable[[str], None] = lambda _: None,
+        recording: FlightRecording | None = None,
+    ) -> None:
+        key = read_key(vehicle.mavlink.key_file) if vehicle.mavlink.key_file else None
+        self.stop = threading.Event()
+        self.failure: str = ""
+        self.latency = {"queue": Latency(), "filter": Latency()}
+        self._vehicle, self._clock, self._say, self._recording = vehicle, clock, say, recording
+        self._queue: BoundedQueue[Item] = BoundedQueue(CAPACITY)
+        self._threads: list[threading.Thread] = []
+        self._sentence = ""
+        self._receiver = Receiver(vehicle.mavlink.allow, key=key)
+        self._link = link or open_link(vehicle.mavlink.link)
+        self._sender = Sender(
+            self._link,
+            system=vehicle.mavlink.system,
+            component=vehicle.mavlink.component,
+            signatures=self._receiver.signatures,
+            tap=recording.sent if recording else None,
+        )
+        self.autopilot = Autopilot(vehicle, self._sender.send, clock, self._restart)
+        self.core = FilterCore(self.autopilot.input.filter_config, vehicle.estimator, recording)
+        tell = recording.state if recording else None
+        self.output = Output(vehicle, self.core.snapshot, self._sender.send, clock, self.autopilot.check, tell)
+        hear = recording.heard if recording else None
+        self._lines = [NooploopStage(line, self._deliver, clock, hear) for line in vehicle.nooploop]
+        self._grabber: Grabber | None = None
+        self._motion: MotionStage | None = None
+        if vehicle.camera is not None and source is not None:
+            self._add_camera(vehicle.camera.sensor, source)
+        self._server = StatusServer(vehicle.status.port, self.status) if vehicle.status.port else None
+
+    def _add_camera(self, sensor: str, source: Source) -> None:
+        config = self._vehicle.filter
+        self._grabber = Grabber(source, config.sensor[sensor].rate_hz)
+        see = self._recording.frame if self._recording else None
+        self._motion = MotionStage(config, sensor, self._grabber.mailbox, self._deliver_motion, self._clock, see)
+
+    def start(self) -> None:
+        """Start every thread."""
+        bodies: dict[str, Callable[[threading.Event], None]] = {
+            "receive": self._receive,
+            "filter": self._filter,
+            "output": self.output.run,
+            "tick": self._tick,
+        }
+        bodies |= {f"nooploop{k}": line.run for k, line in enumerate(self._lines)}
+        if self._grabber is not None and self._motion is not None:
+            bodies |= {"camera": self._grabber.run, "motion": self._motion.run}
+        if self._server is not None:
+            bodies["status"] = self._server.run
+        for name, body in bodies.items():
+            thread = threading.Thread(target=self._guarded, args=(name, body), name=name, daemon=True)
+            self._threads.append(thread)
+            thread.start()
+
+    def run(self) -> str:
+        """Run until :attr:`stop` is set or a thread fails; empty, or what failed."""
+        self.start()
+        while not self.stop.wait(0.2):
+            pass
+        self.close()
+        return self.failure
+
+    def close(self) -> None:
+        """Stop every thread and release every port; what hangs in a driver is left behind."""
+        self.stop.set()
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(JOIN_S)
+        self._link.close()
+        if self._recording is not None:
+            self._recording.close()
+
+    def status(self) -> dict[str, Any]:
+        """Everything that is counted, and the state; plain data."""
+        now = self._clock()
+        state = None
+        snapshot = self.core.snapshot(now)
+        if snapshot is not None:
+            s = snapshot.state
+            state = {
+                "axial_position_m": s.axial_position_m,
+                "axial_velocity_m_s": s.axial_velocity_m_s,
+                "sigma_axial_position_m": s.sigma_axial_position_m,
+                "sigma_axial_velocity_m_s": s.sigma_axial_velocity_m_s,
+                "position_m": s.position_m.tolist(),
+                "velocity_m_s": s.velocity_m_s.tolist(),
+                "flags": [flag.name for flag in type(s.flags) if flag and flag in s.flags],
+                "imu_age_ms": (now - snapshot.imu_ns) * 1e-6,
+            }
+        return {
+            "state": state,
+            "sentence": self._sentence,
+            "advice": dict([self.autopilot.advice]),
+            "output": self._output_status(now),
+            "autopilot": self.autopilot.status(now),
+            "link": {
+                "counts": self._receiver.all_counts(),
+                "lost": {f"{s}/{c}": n for (s, c), n in self._receiver.lost().items()},
+                "sent": dict(self._sender.counts),
+                "unsent": self._link.unsent,
+            },
+            "filter": self._filter_status(),
+            "camera": self._camera_status(),
+            "recording": self._recording.status() if self._recording else None,
+            "nooploop": {
+                line.device: stage.status() for line, stage in zip(self._vehicle.nooploop, self._lines, strict=True)
+            },
+            "latency": {name: histogram.summary() for name, histogram in self._histograms().items()},
+        }
+
+    def _output_status(self, now_ns: int) -> dict[str, Any]:
+        out = self.output
+        return {
+            "reason": out.reason,
+            "sent": out.sent,
+            "age_ms": None if out.sent_ns is None else (now_ns - out.sent_ns) * 1e-6,
+            "withheld": dict(out.withheld),
+            "reset_counter": out.reset_counter,
+        }
+
+    def _filter_status(self) -> dict[str, Any]:
+        verdicts: dict[str, dict[str, int]] = {}
+        for (sensor, verdict), count in list(self.core.verdicts.items()):
+            verdicts.setdefault(sensor, {})[verdict] = count
+        return {
+            "verdicts": verdicts,
+            "refused": dict(self.core.refused),
+            "restarts": dict(self.core.restarts),
+            "waiting": len(self._queue),
+            "dropped": self._queue.dropped,
+        }
+
+    def _camera_status(self) -> dict[str, Any] | None:
+        if self._grabber is None or self._motion is None:
+            return None
+        counts = {**self._grabber.counts, **self._motion.counts, "overwritten": self._grabber.mailbox.dropped}
+        return {**counts, "rate_hz": self._grabber.rate_hz, "ended": self._grabber.ended}
+
+    def _histograms(self) -> dict[str, Latency]:
+        camera = {"camera": self._motion.latency} if self._motion is not None else {}
+        return {**self.latency, **camera, **self.output.latency}
+
+    def _guarded(self, name: str, body: Callable[[threading.Event], None]) -> None:
+        """A thread that fails takes the node down: half a node must not look alive."""
+        try:
+            body(self.stop)
+        except Exception as error:  # whatever it is, the autopilot must not be fed by what is left
+            self.failure = self.failure or f"thread {name}: {type(error).__name__}: {error}"
+            self.stop.set()
+
+    def _receive(self, stop: threading.Event) -> None:
+        while not stop.is_set():
+            data, address = self._link.receive(0.05)
+            if not data:
+                continue
+            arrival_ns = self._clock()
+            if self._recording is not None:
+                self._recording.heard("mavlink_in", data, arrival_ns)
+            messages = self._receiver.feed(data, arrival_ns)
+            if messages:
+                self._link.confirm(address)
+            for message in messages:
+                reading = self.autopilot.take(message, arrival_ns)
+                if reading is not None:
+                    self._deliver(reading, arrival_ns)
+
+    def _deliver(self, reading: Reading, arrival_ns: int) -> None:
+        self._queue.put(Item(reading, "", arrival_ns, None))
+
+    def _deliver_motion(self, motion: PixelMotion, picture: Picture) -> None:
+        self._queue.put(Item(motion, "", self._clock(), picture.arrival_ns))
+
+    def _restart(self, reason: str) -> None:
+        self._queue.put(Item(None, reason, self._clock(), None))
+
+    def _filter(self, stop: threading.Event) -> None:
+        while not stop.is_set():
+            item = self._queue.take(0.05)
+            if item is None:
+                continue
+            if item.reading is None:
+                self.core.restart(item.restart)
+                continue
+            began_ns = self._clock()
+            self.latency["queue"].add((began_ns - item.arrival_ns) * 1e-9)
+            outcome = self.core.push(item.reading, item.arrival_ns)
+            self.latency["filter"].add((self._clock() - began_ns) * 1e-9)
+            if item.picture_ns is not None and outcome is not None and outcome.verdict is Verdict.FUSED:
+                self.output.frame_fused(item.picture_ns)
+
+    def _tick(self, stop: threading.Event) -> None:
+        line_ns = round(self._vehicle.status.line_s * 1e9)
+        next_line_ns = self._clock() + line_ns
+        next_word_ns = 0
+        while not stop.wait(TICK_S):
+            now = self._clock()
+            self.autopilot.tick(now)
+            if now >= next_word_ns:
+                next_word_ns = now + 500_000_000
+                self._judge(now)
+            if line_ns and now >= next_line_ns:
+                next_line_ns = now + line_ns
+                self._say(status_line(self.status()))
+
+    def _judge(self, now_ns: int) -> None:
+        out = self.output
+        bad = self._receiver.counts["bad_signature"]
+        before = self._sentence
+        sending = out.reason == SENDING
+        self._sentence = self.autopilot.sentence(now_ns, sending=sending, why_not=out.reason, bad_signatures=bad)
+        if self._sentence != before:
+            name, value = self.autopilot.advice
+            self._say(f"{self._sentence} (set {name} to {value})" if sending else self._sentence)

@@ -1,0 +1,102 @@
+"""Compile and load everything before the first real reading, so that it does not wait for a compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from axialnav.estimators.errors import FrameError
+from axialnav.fusion.camera_feed import CameraFeed
+from axialnav.fusion.config import Config
+from axialnav.fusion.errors import AxialnavError
+from axialnav.fusion.live.core import ESTIMATORS
+from axialnav.fusion.readings import (
+    Attitude,
+    BlurLength,
+    CameraFrame,
+    Height,
+    ImuSample,
+    PixelMotion,
+    Reading,
+    UwbFix,
+    UwbRange,
+    UwbTdoa,
+    WallRange,
+)
+from axialnav.models.rig import (
+    AnySensor,
+    AttitudeSource,
+    Barometer,
+    BlurMeter,
+    Camera,
+    Flow,
+    Imu,
+    RangeFinder,
+    Uwb,
+)
+
+STEP_NS = 10_000_000
+
+
+def warm_up(config: Config, kind: str) -> None:
+    """Run a throw-away filter for a little longer than its first window, with one late reading of every sensor.
+
+    Raises
+    ------
+    ConfigError
+        The configuration describes no filter.
+    """
+    estimator = ESTIMATORS[kind](config)
+    steps = round(config.start.window_s * 1e9 / STEP_NS) + 20
+    for k in range(steps):
+        for reading in _readings(config, k * STEP_NS, aids=k in (0, 1, steps - 10, steps - 1)):
+            with suppress(AxialnavError):  # made-up numbers need not fit together; what has to be compiled has been
+                estimator.push(reading)
+    with suppress(AxialnavError):
+        estimator.state(steps * STEP_NS)
+    for name, spec in config.sensor.items():
+        if isinstance(spec, Camera) and spec.surface is not None:
+            _warm_camera(config, name, spec)
+
+
+def _readings(config: Config, t_ns: int, aids: bool) -> Iterator[Reading]:
+    for name, spec in config.sensor.items():
+        if isinstance(spec, Imu):
+            x, y, z = (float(c) for c in spec.rotation_BS.T @ [0.0, 0.0, config.gravity_m_s2])
+            yield ImuSample(t_ns=t_ns, sensor=name, gyro_rad_s=(0.0, 0.0, 0.0), accel_m_s2=(x, y, z))
+        elif aids or isinstance(spec, AttitudeSource):
+            yield from _aid(name, spec, t_ns)
+
+
+def _aid(name: str, spec: AnySensor, t_ns: int) -> Iterator[Reading]:
+    t_ns = max(t_ns - STEP_NS - STEP_NS // 2, 0)
+    match spec:
+        case AttitudeSource():
+            yield Attitude(t_ns=t_ns, sensor=name, roll_rad=0.0, pitch_rad=0.0, yaw_rad=0.0)
+        case RangeFinder():
+            yield WallRange(t_ns=t_ns, sensor=name, range_m=1.0)
+        case Flow() | Camera(surface=str()) | BlurMeter(signed=True):
+            yield PixelMotion(t_ns=t_ns, sensor=name, window_s=0.02, dx_px=0.0, dy_px=0.0, sigma_px=1.0, quality=255.0)
+        case BlurMeter():
+            yield BlurLength(t_ns=t_ns, sensor=name, window_s=0.02, length_px=0.0, sigma_px=1.0)
+        case Barometer():
+            yield Height(t_ns=t_ns, sensor=name, height_m=0.0)
+        case Uwb(measurement="position"):
+            yield UwbFix(t_ns=t_ns, sensor=name, position_m=(0.0, 0.0, 0.0))
+        case Uwb(measurement="range", anchors=anchors):
+            yield from (UwbRange(t_ns=t_ns, sensor=name, anchor=anchor, range_m=1.0) for anchor in anchors)
+        case Uwb(anchors=anchors) if len(anchors) > 1:
+            first, second, *_ = anchors
+            yield UwbTdoa(t_ns=t_ns, sensor=name, anchor_a=first, anchor_b=second, difference_m=0.0)
+
+
+def _warm_camera(config: Config, name: str, spec: Camera) -> None:
+    feed = CameraFeed(config)
+    width, height = spec.resolution
+    noise = np.random.Generator(np.random.PCG64(0)).integers(0, 256, (height, width + 64), dtype=np.uint8)
+    period_ns = round(1e9 / (spec.rate_hz or 30.0))
+    for k in range(config.camera.frames + 1):
+        with suppress(FrameError):
+            feed.push(CameraFrame(t_ns=k * period_ns, sensor=name, image=noise[:, 3 * k : 3 * k + width].copy()))

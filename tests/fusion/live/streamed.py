@@ -1,0 +1,314 @@
+"""A vehicle on loopback: a made flight streamed as MAVLink over UDP and as NLink over pseudo-terminals, in real time.
+
+The autopilot's boot clock runs on its own; datagrams and serial bytes are late, lost, out of order, damaged as asked.
+"""
+
+from __future__ import annotations
+
+import heapq
+import os
+import socket
+import struct
+import threading
+import time
+import tty
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pymavlink.dialects.v20.ardupilotmega as mavlink
+from scipy.spatial.transform import Rotation
+
+from axialnav.fusion.config import Config
+from axialnav.fusion.live.vehicle import Inputs, Mavlink, Nooploop, Output, Status, Vehicle
+from tests.fusion.live.contract import Contract, ContractArduPilot
+from tests.fusion.made_flights import FOCAL_PX, MadeFlight, Scene, fly, motion
+
+FLIP = np.array([1.0, -1.0, -1.0])
+FLAGS_NAVIGATING = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
+SCENE = Scene(seed=3, duration_s=8.0, still_s=1.5, sensors=("range0", "flow0", "uwb0"), uwb_rate_hz=50.0)
+Maker = Callable[[int], Any]
+
+
+@dataclass(frozen=True)
+class Air:
+    """What happens between the two ends: shares of packets, and delays [s]."""
+
+    jitter_s: float = 0.0
+    lost: float = 0.0
+    reordered: float = 0.0
+    damaged: float = 0.0
+    seed: int = 0
+
+
+def streamed_flight(scene: Scene = SCENE) -> MadeFlight:
+    """A made flight whose anchors have the numbers that LinkTrack gives them, level and heading along the corridor."""
+    flight = fly(scene)
+    data = flight.config.to_dict()
+    for sensor in data["sensor"].values():
+        if sensor["kind"] == "uwb":
+            sensor["anchors"] = {str(i): list(place) for i, place in enumerate(scene.anchors.values())}
+    return replace(flight, config=Config.from_dict(data))
+
+
+def vehicle_of(config: Config, port: int, ttys: dict[str, str], **output: Any) -> Vehicle:
+    """What a careful user would write for a streamed flight."""
+    lines = [Nooploop(device=device, **{kind: sensor}) for (kind, sensor), device in _lines(config, ttys)]
+    return Vehicle(
+        filter=config,
+        mavlink=Mavlink(link=f"udpout:127.0.0.1:{port}", profile=output.pop("profile", "ardupilot")),
+        input=Inputs(flow="flow0" if "flow0" in config.sensor else None),
+        output=Output(**output),
+        nooploop=tuple(lines),
+        status=Status(port=0, line_s=0.0),
+    )
+
+
+def _lines(config: Config, ttys: dict[str, str]) -> Iterator[tuple[tuple[str, str], str]]:
+    for sensor, device in ttys.items():
+        yield (("ranges" if sensor.startswith("uwb") else "wall"), sensor), device
+
+
+@dataclass
+class StreamedVehicle:
+    """Sends a flight in real time and hears what comes back; times are seconds since :meth:`start`."""
+
+    flight: MadeFlight
+    scene: Scene = SCENE
+    air: Air = Air()
+    contract: Contract = field(default_factory=ContractArduPilot)
+    boot_ns: int = 90_000_000_000
+    drift: float = 30e-6
+    silent: Callable[[str, float], bool] = lambda _name, _t: False  # messages that are not sent, by name and time
+    boot_at: Callable[[float, int], int] = lambda _t, boot: boot  # tampering with the boot clock
+    flags: int = FLAGS_NAVIGATING
+
+    def __post_init__(self) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(0.02)
+        self.port = self.socket.getsockname()[1]
+        self.rng = np.random.default_rng(self.air.seed)
+        self.packer = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self.lock = threading.Lock()
+        self.sent: Counter[str] = Counter()
+        self.dropped: Counter[str] = Counter()
+        self.ttys: dict[str, str] = {}
+        self.masters: dict[str, int] = {}
+        self.slaves: list[int] = []
+        for name in ("uwb0", "range0"):
+            if name in self.flight.tables:
+                self._plug(name)
+        self.peer: tuple[str, int] | None = None
+        self.stop = threading.Event()
+        self.t0_ns = 0
+
+    def _plug(self, name: str) -> None:
+        master, slave = os.openpty()
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        self.masters[name], self.ttys[name] = master, os.ttyname(slave)
+        self.slaves.append(slave)
+
+    def start(self) -> None:
+        """Begin: the flight's first instant is now."""
+        self.events = self._events()
+        self.t0_ns = time.monotonic_ns()
+        self.threads = [threading.Thread(target=body, daemon=True) for body in (self._fly, self._listen)]
+        for thread in self.threads:
+            thread.start()
+
+    def close(self) -> None:
+        self.stop.set()
+        for thread in self.threads:
+            thread.join(2.0)
+        self.socket.close()
+        for handle in (*self.masters.values(), *self.slaves):
+            os.close(handle)
+
+    def now_s(self) -> float:
+        return (time.monotonic_ns() - self.t0_ns) * 1e-9
+
+    def boot(self, t_s: float) -> int:
+        """Boot clock [ns] at flight time ``t_s``."""
+        return self.boot_at(t_s, self.boot_ns + round(t_s * 1e9 * (1.0 + self.drift)))
+
+    # what is sent ---------------------------------------------------------------------------------------------------
+
+    def _events(self) -> list[tuple[float, int, str, Any]]:
+        events: list[tuple[float, str, Any]] = []
+        for name, make in (("imu0", self._imu), ("flow0", self._flow), ("uwb0", self._uwb), ("range0", self._tof)):
+            if name in self.flight.tables:
+                events += [(t, name, data) for t, data in make(self.flight.tables[name])]
+        events += [(t, "attitude", self._attitude(t)) for t in np.arange(0.0, self.scene.duration_s, 0.05)]
+        events += [(t, "report", self._report) for t in np.arange(0.0, self.scene.duration_s, 0.5)]
+        return [(t, k, name, data) for k, (t, name, data) in enumerate(sorted(events, key=lambda e: e[0]))]
+
+    def _seconds(self, table: Any) -> list[float]:
+        return [float(t) for t in (table.t_ns - self.flight.tables["imu0"].t_ns[0]) * 1e-9]
+
+    def _imu(self, table: Any) -> Iterator[tuple[float, Any]]:
+        gyro, accel = table.columns["gyro_rad_s"] * FLIP, table.columns["accel_m_s2"] * FLIP
+        for k, t in enumerate(self._seconds(table)):
+            values = [*accel[k].tolist(), *gyro[k].tolist()]
+            yield (
+                t,
+                lambda boot, v=values: mavlink.MAVLink_highres_imu_message(boot // 1000, *v, *[0.0] * 7, 0x3F),
+            )
+
+    def _flow(self, table: Any) -> Iterator[tuple[float, Any]]:
+        """Sensor axes looking down in the made flights are x to the right, y backwards: turned to x ahead, y right."""
+        for k, t in enumerate(self._seconds(table)):
+            window = float(table.columns["window_s"][k])
+            right, back = (float(table.columns[c][k]) / FOCAL_PX for c in ("dx_px", "dy_px"))
+            about_x, about_y = right, back  # dx_ahead = -back = -about_y; dy_right = right = about_x
+            yield (
+                t + 0.5 * window,
+                lambda boot, w=window, x=about_x, y=about_y: mavlink.MAVLink_optical_flow_rad_message(
+                    boot // 1000, 0, round(w * 1e6), x, y, 0.0, 0.0, 0.0, 0, 200, 0, -1.0
+                ),
+            )
+
+    def _uwb(self, table: Any) -> Iterator[tuple[float, bytes]]:
+        for k, t in enumerate(self._seconds(table)):
+            head = struct.pack("<2sHBBIIIHB", b"\x55\x05", 29, 2, 0, round(t * 1e3), round(t * 1e3), 0, 3700, 1)
+            distance = round(float(table.columns["range_m"][k]) * 1000.0)
+            body = head + struct.pack("<BB", 1, int(table.columns["anchor"][k])) + distance.to_bytes(3, "little")
+            body += bytes([160, 156])
+            yield t, body + bytes([sum(body) & 0xFF])
+
+    def _tof(self, table: Any) -> Iterator[tuple[float, bytes]]:
+        for k, t in enumerate(self._seconds(table)):
+            distance = round(float(table.columns["range_m"][k]) * 1000.0).to_bytes(3, "little")
+            body = (
+                struct.pack("<2sBBI", b"\x57\x00", 0xFF, 0, round(t * 1e3))
+                + distance
+                + struct.pack("<BHB", 0, 900, 0xFF)
+            )
+            yield t, body + bytes([sum(body) & 0xFF])
+
+    def _attitude(self, t: float) -> Any:
+        at = motion(self.scene, np.array([t]))
+        matrix = np.diag(FLIP) @ at.attitude.as_matrix()[0] @ np.diag(FLIP)
+        x, y, z, w = Rotation.from_matrix(matrix).as_quat().tolist()
+        return lambda boot: mavlink.MAVLink_attitude_quaternion_message(boot // 1_000_000, w, x, y, z, 0.0, 0.0, 0.0)
+
+    def _report(self, _boot: int) -> Any:
+        return mavlink.MAVLink_ekf_status_report_message(self.flags, 0.1, 0.1, 0.1, 0.1, 0.0)
+
+    # how it travels -------------------------------------------------------------------------------------------------
+
+    def _fly(self) -> None:
+        due: list[tuple[float, int, str, bytes]] = []
+        beat = 0.0
+        for t, k, name, data in self.events:
+            while not self.stop.is_set():
+                now = self.now_s()
+                if now >= beat:
+                    beat += 1.0
+                    self._emit(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), "HEARTBEAT")
+                while due and due[0][0] <= now:
+                    self._deliver(*heapq.heappop(due)[2:])
+                if now >= t:
+                    break
+                time.sleep(max(min(t, due[0][0] if due else t) - now, 0.0) + 1e-4)
+            if self.stop.is_set():
+                return
+            self._plan(due, t, k, name, data)
+
+    def _plan(self, due: list[tuple[float, int, str, bytes]], t: float, k: int, name: str, data: Any) -> None:
+        if self.silent(name, t):
+            return
+        if not isinstance(data, bytes):
+            with self.lock:
+                data = data(self.boot(t)).pack(self.packer)
+                self.packer.seq = (self.packer.seq + 1) % 256
+        self.sent[name] += 1
+        if self.rng.random() < self.air.lost:
+            self.dropped[name] += 1
+            return
+        late = self.rng.exponential(self.air.jitter_s) if self.air.jitter_s else 0.0
+        if self.rng.random() < self.air.reordered:
+            late += 0.012
+        heapq.heappush(due, (t + min(late, 0.05), k, name, self._damage(name, data)))
+
+    def _damage(self, name: str, data: bytes) -> bytes:
+        if self.rng.random() >= self.air.damaged:
+            return data
+        self.dropped[f"{name} damaged"] += 1
+        kind = self.rng.integers(3)
+        spoilt = bytearray(data)
+        if kind == 0:
+            spoilt[int(self.rng.integers(len(data)))] ^= 1 << int(self.rng.integers(8))
+        elif kind == 1:
+            del spoilt[int(self.rng.integers(1, len(data))) :]
+        else:
+            spoilt[:] = self.rng.bytes(len(data))
+        return bytes(spoilt)
+
+    def _deliver(self, name: str, data: bytes) -> None:
+        if name in self.masters:
+            try:
+                os.write(self.masters[name], data)
+            except OSError:
+                self.dropped[f"{name} unread"] += 1
+        elif self.peer is not None:
+            self.socket.sendto(data, self.peer)
+        else:
+            self.dropped[f"{name} before the first contact"] += 1
+
+    def _emit(self, message: Any, name: str) -> None:
+        with self.lock:
+            data = message.pack(self.packer)
+            self.packer.seq = (self.packer.seq + 1) % 256
+        self.sent[name] += 1
+        self._deliver(name, data)
+
+    def _listen(self) -> None:
+        while not self.stop.is_set():
+            try:
+                data, peer = self.socket.recvfrom(4096)
+            except TimeoutError:
+                continue
+            self.peer = peer
+            t = self.now_s()
+            for message in self.contract.take(data, self.boot(t)):
+                if message.get_type() == "TIMESYNC" and message.tc1 == 0 and not self.silent("TIMESYNC", t):
+                    self._emit(mavlink.MAVLink_timesync_message(self.boot(t), message.ts1), "TIMESYNC")
+
+    # what came back -------------------------------------------------------------------------------------------------
+
+    def axial_errors(self, start_s: float, end_s: float) -> np.ndarray:
+        """Axial velocity of every ODOMETRY minus the truth at its stamp [m/s], between two flight times."""
+        rows = []
+        for _, m in self.contract.messages:
+            if m.get_type() != "ODOMETRY":
+                continue
+            t = (m.time_usec * 1000 - self.t0_ns) * 1e-9
+            if start_s <= t < end_s:
+                w, x, y, z = m.q
+                rows.append((t, *Rotation.from_quat([x, y, z, w]).apply([m.vx, m.vy, m.vz])))
+        table = np.array(rows)
+        return np.asarray(table[:, 1] - motion(self.scene, table[:, 0]).velocity_m_s[:, 0])
+
+    def stamps_s(self) -> np.ndarray:
+        """Arrival of every ODOMETRY or delta in flight time [s]."""
+        names = ("ODOMETRY", "VISION_POSITION_DELTA")
+        return np.array([(t - self.boot_ns) * 1e-9 for t, m in self.contract.messages if m.get_type() in names])
+
+
+def ahead(config: Config) -> Config:
+    """The configuration with the flow sensor's axes as MAVLink has them: x ahead, y to the right, z down."""
+    data = config.to_dict()
+    T = np.array(data["sensor"]["flow0"]["T_BS"]).reshape(4, 4)
+    T[:3, :3] = np.diag(FLIP)
+    data["sensor"]["flow0"]["T_BS"] = T.ravel().tolist()
+    return Config.from_dict(data)
+
+
+def with_output(vehicle: Vehicle, **changes: Any) -> Vehicle:
+    """Copy of a vehicle with other output rules."""
+    return msgspec.structs.replace(vehicle, output=msgspec.structs.replace(vehicle.output, **changes))
