@@ -87,6 +87,7 @@ def blur_ratio(fit: Fit, band: Band, rows: Array, exposure_ratio: float) -> Kapp
         return UNKNOWN
 
     def grouped(values: Array) -> Array:
+        """Means of neighbouring frequencies (..., f), shape (..., count)."""
         used = values[..., first : first + count * size]
         return np.ascontiguousarray(used.reshape(*values.shape[:-1], count, size).mean(axis=-1))
 

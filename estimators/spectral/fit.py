@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 WIDE_REACH_PX = 24.0  # copies nearer than this leave a comb too wide for the tables
 LOWEST, LOW_STARTS = 0.06, 14
-MOST, RIVAL_SHARE = 5, 0.4
+MOST = 5
+MOST_SLOW, MOST_FAST = 2, 3
 STEPS = 12
 BLUR_STEP = 0.1  # relative
 BLUR_RATIOS = (0.02, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
@@ -183,7 +184,8 @@ def starts(spectra: Spectra, usable: Mask, frames: int, ratio: float, reach_px: 
     low = WIDE_REACH_PX / spread
     grid = np.geomspace(LOWEST * low, low, LOW_STARTS)
     thetas, cost = climb_all(coarse, smooth, grid, ratio)
-    found = [(theta, still - float(value)) for theta, value in zip(thetas, cost, strict=True)]
+    slow = [(theta, still - float(value)) for theta, value in zip(thetas, cost, strict=True)]
+    fast = []
     while low < reach_px:
         high = min(2.0 * low, reach_px)
         level = pose(spectra, usable, frames, high * spread)
@@ -191,14 +193,22 @@ def starts(spectra: Spectra, usable: Mask, frames: int, ratio: float, reach_px: 
         for i in _tops(gain):
             theta = smooth.copy()
             theta[SHIFT] = at[i]
-            found.append((theta, float(gain[i])))
+            fast.append((theta, float(gain[i])))
         low = high
-    found.sort(key=lambda item: -item[1])
-    best = found[0][1]
-    kept: list[Array] = []
-    for theta, promise in found:
+    kept = _most_promising(slow, MOST_SLOW, [])
+    return _most_promising(fast, MOST_FAST, kept)
+
+
+def _most_promising(found: list[tuple[Array, float]], most: int, kept: list[Array]) -> list[Array]:
+    """``kept`` and the best of what was found elsewhere.
+
+    Promises of slow displacements come from climbs, those of fast ones from tables, where the texture is only roughly
+    right: they can be ranked among themselves, but not against each other.
+    """
+    kept, room = list(kept), len(kept) + most
+    for theta, _ in sorted(found, key=lambda item: -item[1]):
         near = any(abs(theta[SHIFT] - other[SHIFT]) < SAME * other[SHIFT] for other in kept)
-        if promise >= RIVAL_SHARE * best and not near and len(kept) < MOST:
+        if not near and len(kept) < room:
             kept.append(theta)
     return kept
 

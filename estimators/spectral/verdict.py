@@ -9,7 +9,7 @@ from axialnav.estimators.frames import Image, unusable
 from axialnav.estimators.result import MotionReason
 from axialnav.estimators.spectral.fit import Fit
 
-MIN_MARGIN, MIN_LIGHT = 6.0, 3.0
+MIN_MARGIN, MIN_LIGHT = 12.0, 3.0  # noise among all lengths wins by 7 in one picture of fifty
 MAX_EXCESS, MAX_CODED_EXCESS = 1.45, 3.5  # a codec's noise is not white
 MAX_SHARE, MAX_SIGMA_PX = 0.1, 0.5
 

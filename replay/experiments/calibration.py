@@ -96,6 +96,7 @@ def figure(path: Path, velocity: Array, lengths: dict[str, Array], line: Line | 
     """Velocity against composite length, and what is left over after the line of the joint estimator."""
 
     def paint(sheet: Figure) -> None:
+        """Line above, residuals below."""
         above, below = sheet.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         longest = 1.1 * FASTEST_M_S / law_m_s_px()
         span = np.array([0.0, longest])

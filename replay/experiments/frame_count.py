@@ -81,6 +81,7 @@ def figure(path: Path, seed: int, scores: Scores) -> Path:
     scene = Scene(wall, 2.0 * CONTRAST, DIM, trajectory=Trajectory(SHOWN_PX))
 
     def paint(sheet: Figure) -> None:
+        """Spectra above, errors against N below."""
         grid = sheet.add_gridspec(2, 2 * len(COUNTS), height_ratios=(1, 2.2))
         for i, count in enumerate(COUNTS):
             composite = composite_mean(_window(scene, count, np.random.default_rng(seed)).frames)

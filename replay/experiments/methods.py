@@ -35,6 +35,7 @@ def one_frame(method: Callable[[ArrayLike], BlurReading]) -> Measure:
     """Read the middle frame; blur ``l`` of one exposure means ``l T / te`` per frame (the paper's equation 3)."""
 
     def measure(window: Window) -> tuple[float, ...]:
+        """From the middle frame."""
         reading = method(window.frames[len(window.frames) // 2])
         return (reading.length_px * window.frame_period_s / window.exposure_s,)
 
@@ -45,6 +46,7 @@ def of_composite(method: Callable[[ArrayLike], BlurReading]) -> Measure:
     """Read the mean of all frames; composite length ``l_c`` means ``l_c / N`` per frame."""
 
     def measure(window: Window) -> tuple[float, ...]:
+        """From the mean of all frames."""
         return (method(composite_mean(window.frames)).length_px / len(window.frames),)
 
     return measure
@@ -54,6 +56,7 @@ def of_composite_either_way(method: Callable[[ArrayLike], BlurReading]) -> Measu
     """Read the mean of all frames; leave open whether dark lines (``l_c / N``) or bright ridges (``d``) were read."""
 
     def measure(window: Window) -> tuple[float, ...]:
+        """Both readings of the mean of all frames."""
         length = method(composite_mean(window.frames)).length_px
         return length / len(window.frames), length
 
@@ -64,6 +67,7 @@ def estimator(method: str) -> Measure:
     """One of the package's own estimators; NaN when it refuses."""
 
     def measure(window: Window) -> tuple[float, ...]:
+        """By the package's estimator."""
         frames = window.frames if method != "single" else window.frames[len(window.frames) // 2][None]
         estimate = estimate_motion(
             frames, method=method, frame_period_s=window.frame_period_s, exposure_s=window.exposure_s

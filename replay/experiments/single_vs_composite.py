@@ -101,6 +101,7 @@ def figure(path: Path, seed: int, scores: Scores) -> Path:
     }
 
     def paint(sheet: Figure) -> None:
+        """Spectra above, failures and errors below."""
         grid = sheet.add_gridspec(4, 4, height_ratios=(1, 1, 1, 2.4))
         for column, (title, image) in enumerate(shots.items()):
             image = np.asarray(image, dtype=np.float32)
