@@ -20,6 +20,7 @@ from cyclopts.exceptions import CycloptsError
 from axialnav.fusion.complaints import INTERRUPTED, PASSED, USAGE, complain, explain, shows_tracebacks
 from axialnav.fusion.live import cli as on_board
 from axialnav.replay.cli_check import check, compare
+from axialnav.replay.cli_doctor import doctor
 from axialnav.replay.cli_output import emit
 from axialnav.replay.cli_replay import demo, replay
 from axialnav.replay.cli_simulate import simulate
@@ -28,6 +29,7 @@ from axialnav.replay.motion_cli import motion_command
 VERBS: dict[str, Callable[..., int]] = {
     "demo": demo,
     "simulate": simulate,
+    "doctor": doctor,
     "replay": replay,
     "motion": motion_command,
     "check": check,
