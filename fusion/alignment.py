@@ -24,6 +24,7 @@ from axialnav.models.state import (
     E_VEL,
     E_WALL_OFFSET,
     GYRO_BIAS,
+    N_ERROR,
     N_NOMINAL,
     POS,
     QUAT,
@@ -34,6 +35,7 @@ Array = NDArray[np.float64]
 UWB_KINDS = (int(Kind.UWB_RANGE), int(Kind.UWB_TDOA), int(Kind.UWB_POSITION))
 MIN_STILL_SAMPLES = 5
 SIGMA_BIAS_FLOOR_RAD_S = 1e-3
+SIGMA_FREE_PLACE_M = 1e-3
 SIGMA_YAW_FREE_RAD = 1e-2  # without an absolute frame yaw 0 is where the vehicle looks at the start
 
 
@@ -70,6 +72,7 @@ def align(config: Config, src: Records, events: Events, memory: Memory) -> None:
     x[GYRO_BIAS : GYRO_BIAS + 3] = level.gyro_bias_rad_s
     memory.core["x"] = x
     memory.core["P"] = np.diag(_first_variances(config, initial, level))
+    memory.core["path_variance"] = _free_place_sigma(config) ** 2
     memory.core["t_aid"] = memory.core["t_flow"] = t0
     memory.sources["t_trusted"] = t0
 
@@ -111,17 +114,22 @@ def _first_variances(config: Config, initial: Initial, level: Level) -> Array:
     bias = start.sigma_gyro_bias_rad_s
     if level.still_s:
         bias = min(bias, math.hypot(imu.gyro_noise_density / math.sqrt(level.still_s), SIGMA_BIAS_FLOOR_RAD_S))
-    sigma = np.zeros(18)
+    sigma = np.zeros(N_ERROR)
     sigma[E_POS : E_POS + 3] = initial.sigma_position_m
     sigma[E_VEL : E_VEL + 3] = initial.sigma_velocity_m_s
     sigma[E_ATT : E_ATT + 3] = tilt, tilt, initial.sigma_yaw_rad
     sigma[E_GYRO_BIAS : E_GYRO_BIAS + 3] = bias
     sigma[E_ACCEL_BIAS : E_ACCEL_BIAS + 3] = start.sigma_accel_bias_m_s2
     sigma[E_BLUR_SCALE] = config.flow.scale_sigma
-    sigma[E_UWB_BIAS] = config.uwb.bias_sigma_m
     sigma[E_WALL_OFFSET] = config.range.offset_sigma_m
+    sigma[E_UWB_BIAS:] = _free_place_sigma(config)
     variances: Array = sigma**2
     return variances
+
+
+def _free_place_sigma(config: Config) -> float:
+    """Of a bias that no path has yet: not zero, so that the covariance has an inverse."""
+    return max(config.uwb.bias_sigma_m, SIGMA_FREE_PLACE_M)
 
 
 def initial_from_uwb(config: Config, src: Records, events: Events, window: NDArray[np.bool_], level: Level) -> Initial:

@@ -29,7 +29,7 @@ from axialnav.fusion.kernels.measure import BLUR, FLOW, measure
 from axialnav.fusion.kernels.propagate import rotate_sample
 from axialnav.fusion.kernels.reanchor import observe_source, reanchor
 from axialnav.fusion.kernels.run import note_arrival
-from axialnav.fusion.kernels.update import MIN_WEIGHT, is_uwb, redescend, repetition
+from axialnav.fusion.kernels.update import MIN_WEIGHT, is_uwb, redescend
 from axialnav.fusion.memory import (
     LOG_CODE,
     LOG_GATE,
@@ -58,7 +58,7 @@ MAX_TILT_COSINE = 0.2  # steeper than 78 degrees, tilt says nothing of the accel
 
 
 class AxialFilter:
-    """The filter itself, one event at a time, on the memory of the 18-state filter.
+    """The filter itself, one event at a time, on the memory of the 25-state filter.
 
     Parameters
     ----------
@@ -115,6 +115,7 @@ class AxialFilter:
         given = self.config.axial.heading_rad
         self._heading_rad = initial.yaw_rad + yaw if given is None else given
         memory = new_memory(len(self.sources))
+        memory.core["path_heard"] = np.iinfo(np.int64).max  # no place for biases of UWB paths among four states
         core = memory.core[0]
         x = core["x"][0]
         x[POS : POS + 3], x[VEL : VEL + 3] = initial.position_m, initial.velocity_m_s
@@ -223,7 +224,7 @@ class AxialFilter:
         core["P"][0] = S + self.held.E @ self._ekf.P @ self.held.E.T
 
     def _aid(self, t_ns: int, source: int, values: Array, memory: Memory, log: Array) -> None:
-        """One reading: bookkeeping, gate, update, recovery; the same steps as in the 18-state filter."""
+        """One reading: bookkeeping, gate, update, recovery; the same steps as in the 25-state filter."""
         core, s, seen, kind = (
             memory.core[0],
             self.sources[source],
@@ -235,7 +236,7 @@ class AxialFilter:
         w, x = self._scratch[0], core["x"][0]
         w["p"] = x[POS : POS + 3] + (t_ns - int(core["t_imu"])) * 1e-9 * x[VEL : VEL + 3]
         w["R"] = rotation_matrix(x[QUAT : QUAT + 4])
-        axes = measure(s, seen, values, x, core["P"][0], core, w, self.settings[0])
+        axes = measure(t_ns, s, seen, values, x, core["P"][0], core, w, self.settings[0])
         log[LOG_CODE] = axes
         used = axes > 0 and self._fuse(axes, s, seen, core, w, log)
         if used:
@@ -253,9 +254,7 @@ class AxialFilter:
     def _fuse(self, axes: int, s: Any, seen: Any, core: Any, w: Any, log: Array) -> bool:
         """Gate a reading and correct both parts of the state with it; whether it was used."""
         x, P, H = core["x"][0], core["P"][0], w["H"][:axes].copy()
-        repeated = 1.0
-        if is_uwb(int(s["kind"])):
-            repeated = repetition(float(seen["gap_s"]), float(self.settings["uwb_correlation_s"][0]))
+        repeated = float(w["repeated"])
         y, variance = (w["z"] - w["h"])[:axes], w["variance"][:axes] * repeated
         S = H @ P @ H.T + np.diag(variance)
         nis = float(y @ np.linalg.solve(S, y)) if np.isfinite(S).all() else math.nan

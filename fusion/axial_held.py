@@ -1,9 +1,9 @@
 r"""What the axial estimator holds but does not estimate along with its four states.
 
-Memory and kernels are those of the 18-state filter, so that every measurement model, gate and record serves both.  The
-four axial states are the columns of an embedding E (18, 4): along the axis in position, velocity and accelerometer
+Memory and kernels are those of the 25-state filter, so that every measurement model, gate and record serves both.  The
+four axial states are the columns of an embedding E (25, 4): along the axis in position, velocity and accelerometer
 bias, and the blur scale.  The covariance is :math:`P = E P_4 E^\top + \Sigma`: :math:`\Sigma` holds position and
-velocity across the axis, UWB bias and wall offset, which small updates of their own follow (the correlation with the
+velocity across the axis and wall offset, which small updates of their own follow (the correlation with the
 axial states is dropped), and the uncertainty of attitude and gyro bias, which stays as given.
 """
 
@@ -24,12 +24,10 @@ from axialnav.models.state import (
     E_BLUR_SCALE,
     E_GYRO_BIAS,
     E_POS,
-    E_UWB_BIAS,
     E_VEL,
     E_WALL_OFFSET,
     N_ERROR,
     POS,
-    UWB_BIAS,
     VEL,
     WALL_OFFSET,
 )
@@ -47,8 +45,6 @@ class Held:
     attitude_variance: Array
     lateral_variance: float
     lateral_time_s: float
-    uwb_variance: float
-    uwb_time_s: float
     offset_walk: float
 
     @classmethod
@@ -66,8 +62,6 @@ class Held:
             attitude_variance=np.array([tilt, tilt, tune.sigma_yaw_rad**2, rate, rate, rate]),
             lateral_variance=tune.lateral_speed_m_s**2,
             lateral_time_s=tune.lateral_time_s,
-            uwb_variance=config.uwb.bias_sigma_m**2,
-            uwb_time_s=config.uwb.bias_time_s,
             offset_walk=config.range.offset_walk_m**2,
         )
 
@@ -77,27 +71,26 @@ class Held:
         return np.eye(3) - np.outer(self.axis, self.axis)
 
     def states(self, x: Array) -> Array:
-        """Axial position, velocity, acceleration bias and blur scale (4,) of a nominal state (19,)."""
+        """Axial position, velocity, acceleration bias and blur scale (4,) of a nominal state (26,)."""
         along = [self.axis @ x[at : at + 3] for at in (POS, VEL, ACCEL_BIAS)]
         return np.array([*along, x[BLUR_SCALE]])
 
     def put_states(self, x: Array, states: Array) -> None:
-        """Write the four states into the nominal state ``x`` (19,)."""
+        """Write the four states into the nominal state ``x`` (26,)."""
         for at, value in zip((POS, VEL, ACCEL_BIAS), states[:3], strict=True):
             x[at : at + 3] += self.axis * (value - self.axis @ x[at : at + 3])
         x[BLUR_SCALE] = states[3]
 
     def split(self, P: Array) -> tuple[Array, Array]:
-        """Covariance of the four states (4, 4) and of what is held (18, 18)."""
+        """Covariance of the four states (4, 4) and of what is held (25, 25)."""
         P4 = self.E.T @ P @ self.E
         return P4, P - self.E @ P4 @ self.E.T
 
     def first(self, position_variance: float, offset_variance: float) -> Array:
-        """Covariance (18, 18) of the held quantities at the start."""
+        """Covariance (25, 25) of the held quantities at the start."""
         S = np.zeros((N_ERROR, N_ERROR))
         S[E_POS : E_POS + 3, E_POS : E_POS + 3] = position_variance * self.across
         S[E_VEL : E_VEL + 3, E_VEL : E_VEL + 3] = self.lateral_variance * self.across
-        S[E_UWB_BIAS, E_UWB_BIAS] = self.uwb_variance
         S[E_WALL_OFFSET, E_WALL_OFFSET] = offset_variance
         self._consider(S)
         return S
@@ -108,22 +101,19 @@ class Held:
         S[diagonal, diagonal] = self.attitude_variance
 
     def drift(self, x: Array, S: Array, dt: float) -> Array:
-        """Move the held part of ``x`` (19,) in place over ``dt`` [s]; return its new covariance.
+        """Move the held part of ``x`` (26,) in place over ``dt`` [s]; return its new covariance.
 
         Velocity across the axis forgets itself within ``lateral_time_s`` (first-order Gauss-Markov).
         """
-        keep, keep_uwb = math.exp(-dt / self.lateral_time_s), math.exp(-dt / self.uwb_time_s)
+        keep = math.exp(-dt / self.lateral_time_s)
         velocity = self.across @ x[VEL : VEL + 3]
         x[POS : POS + 3] += dt * velocity
         x[VEL : VEL + 3] -= (1.0 - keep) * velocity
-        x[UWB_BIAS] *= keep_uwb
         A = np.eye(N_ERROR)
         A[E_POS : E_POS + 3, E_VEL : E_VEL + 3] = dt * np.eye(3)
         A[E_VEL : E_VEL + 3, E_VEL : E_VEL + 3] *= keep
-        A[E_UWB_BIAS, E_UWB_BIAS] = keep_uwb
         S = A @ S @ A.T
         S[E_VEL : E_VEL + 3, E_VEL : E_VEL + 3] += (1.0 - keep**2) * self.lateral_variance * self.across
-        S[E_UWB_BIAS, E_UWB_BIAS] += (1.0 - keep_uwb**2) * self.uwb_variance
         S[E_WALL_OFFSET, E_WALL_OFFSET] += self.offset_walk * dt
         return np.asarray(S)
 
@@ -139,7 +129,6 @@ class Held:
         step = gain @ y
         x[POS : POS + 3] += step[E_POS : E_POS + 3]
         x[VEL : VEL + 3] += step[E_VEL : E_VEL + 3]
-        x[UWB_BIAS] += step[E_UWB_BIAS]
         x[WALL_OFFSET] += step[E_WALL_OFFSET]
         keep = np.eye(N_ERROR) - gain @ H
         S = keep @ S @ keep.T + gain @ R @ gain.T

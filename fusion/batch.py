@@ -36,7 +36,7 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import InnovationLog, Reason, Track, Verdict, verdict_of
 from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors
-from axialnav.models.state import E_ATT, E_POS, E_VEL, NOMINAL_SLICES
+from axialnav.models.state import E_ATT, E_POS, E_VEL, N_ERROR, NOMINAL_SLICES
 
 Array = NDArray[np.float64]
 CHUNKS = 50
@@ -125,8 +125,8 @@ def _step(
 def unpack_track(t_ns: NDArray[np.int64], rows: Array) -> Track:
     """Name the columns of track rows."""
     state = {name: rows[:, cut] for name, cut in NOMINAL_SLICES.items()}
-    scalars = {name: state.pop(name)[:, 0] for name in ("blur_scale", "uwb_bias_m", "wall_offset_m")}
-    variance = rows[:, TRACK_VARIANCE : TRACK_VARIANCE + 18]
+    scalars = {name: state.pop(name)[:, 0] for name in ("blur_scale", "wall_offset_m")}
+    variance = rows[:, TRACK_VARIANCE : TRACK_VARIANCE + N_ERROR]
     return Track(
         t_ns=t_ns,
         **state,

@@ -77,8 +77,8 @@ class ImuTuning(_Table, frozen=True, kw_only=True):
     ``gyro_noise_scale`` multiply the sensor's densities.
     """
 
-    accel_noise_scale: Positive = 1.0
-    gyro_noise_scale: Positive = 1.0
+    accel_noise_scale: Positive = 2.0
+    gyro_noise_scale: Positive = 1.5
 
 
 class StartTuning(_Table, frozen=True, kw_only=True):
@@ -111,12 +111,12 @@ class ImuFault(_Table, frozen=True, kw_only=True):
     """
 
     enabled: bool = True
-    noise_scale: Positive = 10.0
+    noise_scale: Positive = 5.0
     bias_walk: Positive = 1.0
-    doubt_m_s2: Positive = 0.4
+    doubt_m_s2: Positive = 0.3
     doubt_time_s: Positive = 0.5
     trial_s: Positive = 2.0
-    evidence: Positive = 40.0
+    evidence: Positive = 50.0
     evidence_to_clear: NonNegative = 1.5
     trials_to_clear: Annotated[int, msgspec.Meta(ge=1)] = 5
 
@@ -124,16 +124,22 @@ class ImuFault(_Table, frozen=True, kw_only=True):
 class UwbTuning(_Table, frozen=True, kw_only=True):
     """Noise of UWB readings.
 
-    Errors of neighbouring readings are alike over ``correlation_time_s``; a reading that comes every dt is given the
-    variance ``sigma_m^2 coth(dt / 2 correlation_time_s)``, so that fast receivers are not believed too much.  Fixes
-    that a receiver computed itself have ``fix_sigma_m``: they are as good as its geometry, which we cannot see.
+    A reading errs by white noise of ``sigma_m`` and by the bias of its path: per anchor, of ``bias_sigma_m``, alike over
+    ``bias_time_s`` and over ``bias_length_m`` of way.  Fixes that a receiver computed itself have ``fix_sigma_m`` and
+    ``fix_bias_sigma_m`` per axis: they are as good as its geometry, which we cannot see.
+
+    Where biases are not estimated (0, or more paths than the filter has states), errors of neighbouring readings are
+    taken as alike over ``correlation_time_s``: the variance of one that comes every dt is multiplied by
+    ``coth(dt / 2 correlation_time_s)``.
     """
 
-    sigma_m: Positive = 0.15
+    sigma_m: Positive = 0.1
     fix_sigma_m: Positive = 1.0
+    bias_sigma_m: NonNegative = 0.15
+    fix_bias_sigma_m: NonNegative = 0.0
+    bias_time_s: Positive = 2.5
+    bias_length_m: Positive = 1.0
     correlation_time_s: NonNegative = 0.014
-    bias_sigma_m: Positive = 0.002
-    bias_time_s: Positive = 10.0
     gate: Gate = Gate(soft_sigma=2.5)
 
 
@@ -167,9 +173,13 @@ class RangeTuning(_Table, frozen=True, kw_only=True):
 
 
 class HeightTuning(_Table, frozen=True, kw_only=True):
-    """Noise of barometric height; wide, because indoors air pressure follows doors and propellers, not height."""
+    """Noise of barometric height; wide, because indoors air pressure follows doors and propellers, not height.
+
+    Errors are alike over ``correlation_time_s``: many readings within it count as one.
+    """
 
     sigma_m: Positive = 2.0
+    correlation_time_s: NonNegative = 10.0
     gate: Gate = Gate()
 
 

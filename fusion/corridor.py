@@ -59,7 +59,7 @@ class PastStateError(AxialnavError):
 
 
 class CorridorEstimator:
-    """Full error-state filter (18 states) behind one door.
+    """Full error-state filter (25 states) behind one door.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ class CorridorEstimator:
             gyro_bias_rad_s=x[GYRO_BIAS : GYRO_BIAS + 3].copy(),
             accel_bias_m_s2=x[ACCEL_BIAS : ACCEL_BIAS + 3].copy(),
             blur_scale=float(x[BLUR_SCALE]),
-            uwb_bias_m=float(x[UWB_BIAS]),
+            uwb_bias_m=x[UWB_BIAS:].copy(),
             wall_offset_m=float(x[WALL_OFFSET]),
             covariance=P.copy(),
             flags=flags,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError
 from axialnav.models.rig import Imu
-from axialnav.models.state import N_ERROR, N_NOMINAL
+from axialnav.models.state import N_BIASES, N_ERROR, N_NOMINAL
 
 Array = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -38,6 +38,10 @@ MEMORY: Final = np.dtype(
         ("t_trial", "i8"),
         ("good_trials", "i8"),
         ("evidence", "f8"),  # log-likelihood of the rival minus that of the estimate
+        # UWB paths that have a bias state: which, when last heard, stationary variance [m^2]
+        ("path", "i8", N_BIASES),
+        ("path_heard", "i8", N_BIASES),
+        ("path_variance", "f8", N_BIASES),
         ("correction", "f8", 3),  # sum of velocity corrections since the last inertial step [m/s]
         ("correction_rate", "f8", 3),  # their fading mean [m/s^2]
     ],
@@ -65,15 +69,15 @@ SCRATCH: Final = np.dtype(
         ("z", "f8", 3), ("h", "f8", 3), ("variance", "f8", 3), ("H", "f8", (3, N_ERROR)), ("S", "f8", (3, 3)),
         ("y", "f8", 3), ("PHt", "f8", N_ERROR), ("gain", "f8", N_ERROR), ("step", "f8", N_ERROR), ("R", "f8", (3, 3)),
         ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 8), ("p", "f8", 3), ("mean_imu", "f8", 6),
-        ("focal_window", "f8", 2), ("row", "f8", 10),
+        ("focal_window", "f8", 2), ("row", "f8", 10), ("repeated", "f8"),
     ],
     align=True,
 )  # fmt: skip
 
 # layout of a track row: nominal state, variances of the error state, off-diagonals of position and velocity, rest
-TRACK_STATE, TRACK_VARIANCE, TRACK_POS_CROSS, TRACK_VEL_CROSS = 0, 19, 37, 40
-TRACK_FLAGS, TRACK_RESETS = 43, 44
-TRACK_WIDTH: Final = 45
+TRACK_STATE, TRACK_VARIANCE, TRACK_POS_CROSS = 0, N_NOMINAL, N_NOMINAL + N_ERROR
+TRACK_VEL_CROSS, TRACK_FLAGS, TRACK_RESETS = TRACK_POS_CROSS + 3, TRACK_POS_CROSS + 6, TRACK_POS_CROSS + 7
+TRACK_WIDTH: Final = TRACK_POS_CROSS + 8
 
 # layout of a log row
 LOG_CODE, LOG_INNOVATION, LOG_VARIANCE, LOG_NIS, LOG_GATE, LOG_WEIGHT = 0, 1, 4, 7, 8, 9
@@ -98,7 +102,9 @@ def new_memory(n_sources: int) -> Memory:
         sources[stamp] = LONG_AGO
     sources["gap_s"] = sources["datum_m"] = np.nan
     sources["trust"] = 1.0
-    return Memory(np.zeros(1, MEMORY), sources)
+    core = np.zeros(1, MEMORY)
+    core["path"], core["path_heard"] = -1, LONG_AGO
+    return Memory(core, sources)
 
 
 def new_scratch() -> Records:
@@ -108,8 +114,8 @@ def new_scratch() -> Records:
 
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
-    "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_variance", "uwb_bias_time_s",
-    "wall_offset_walk", "uwb_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s", "evidence", "trials_to_clear",
+    "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_time_s", "uwb_bias_length_m",
+    "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s", "evidence", "trials_to_clear",
     "evidence_to_clear", "dead_reckoning_s", "invalid_s", "reanchor_aided_s", "reanchor_alone_s",
 )  # fmt: skip
 SETTINGS: Final = np.dtype([(name, "f8") for name in SETTINGS_FIELDS])
@@ -152,10 +158,11 @@ def build_settings(config: Config) -> Records:
         "fault_accel_variance": accel * fault.noise_scale**2,
         "fault_accel_walk": fault.bias_walk**2,
         "blur_scale_walk": config.flow.scale_walk**2,
-        "uwb_bias_variance": config.uwb.bias_sigma_m**2,
         "uwb_bias_time_s": config.uwb.bias_time_s,
+        "uwb_bias_length_m": config.uwb.bias_length_m,
         "wall_offset_walk": config.range.offset_walk_m**2,
         "uwb_correlation_s": config.uwb.correlation_time_s,
+        "height_correlation_s": config.height.correlation_time_s,
         "doubt_m_s2": fault.doubt_m_s2 if fault.enabled else np.inf,
         "doubt_time_s": fault.doubt_time_s,
         "trial_s": fault.trial_s,

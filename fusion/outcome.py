@@ -110,6 +110,7 @@ class Outcome(msgspec.Struct, frozen=True, gc=False):
 class AxialState:
     """The estimate at one instant, corridor frame W (x axial, z up), SI units.
 
+    ``uwb_bias_m`` (8,) are the biases of the UWB paths that have a state, 0 where none is;
     ``velocity_covariance`` is 3x3; ``resets`` counts position re-anchorings and ``last_reset_delta_m`` is the jump of
     the latest one.
     """
@@ -125,7 +126,7 @@ class AxialState:
     gyro_bias_rad_s: Array
     accel_bias_m_s2: Array
     blur_scale: float
-    uwb_bias_m: float
+    uwb_bias_m: Array
     wall_offset_m: float
     covariance: Array
     flags: Health
@@ -148,7 +149,7 @@ class Track:
     """The estimate at every IMU sample; arrays over n samples, corridor frame, SI units.
 
     ``position_covariance`` and ``velocity_covariance`` are (n, 3, 3), ``quaternion_WB`` (n, 4) scalar first,
-    ``sigma_attitude_rad`` (n, 3) in body axes, ``flags`` (n,) of :class:`Health`, ``resets`` (n,) running count.
+    ``uwb_bias_m`` (n, 8), ``sigma_attitude_rad`` (n, 3) in body axes, ``flags`` (n,) of :class:`Health`, ``resets`` (n,) running count.
     """
 
     t_ns: NDArray[np.int64]

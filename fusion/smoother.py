@@ -25,6 +25,7 @@ from axialnav.fusion.kernels.smooth import STEP, WORK, smooth_back
 from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, Memory, build_settings, new_memory, new_scratch
 from axialnav.fusion.outcome import Track
 from axialnav.fusion.sources import Kind, Records, build_sources
+from axialnav.models.state import N_BIASES
 
 Array = NDArray[np.float64]
 STRETCH = 2000  # events between two cuts: 20 MB of records
@@ -110,6 +111,7 @@ class Pass:
         # a row more than there can be steps: the record of an event that turns out to be no step
         steps, work, scratch = np.zeros(longest + 1, STEP), np.zeros(1, WORK), new_scratch()
         one_row, one_log, imu = np.zeros((1, TRACK_WIDTH)), np.zeros((1, LOG_WIDTH)), np.zeros(6)
+        paths = np.zeros(N_BIASES, np.int64)
         last = self.cuts[-1][2].core
         work["x"][0], work["P"][0] = last["x"][0, 0], last["P"][0, 0]
         spent, self.steps = 0.0, 0
@@ -118,10 +120,10 @@ class Pass:
             again = memory.copy()
             n = record(
                 start, stop, *self.events, self.sources, again.core, again.sources, scratch, self.settings,
-                one_row, one_log, imu, steps,
+                one_row, one_log, imu, paths, steps,
             )  # fmt: skip
             if smooth:
-                smooth_back(steps, n, work, self.settings[0], self.rows[row:])
+                smooth_back(steps, n, work, self.rows[row:])
             spent += time.perf_counter() - began
             self.steps += n
             if progress is not None:

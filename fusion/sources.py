@@ -48,6 +48,8 @@ SOURCE = np.dtype(
         ("kind", "i8"),
         ("enabled", "?"),
         ("sigma", "f8"),
+        ("bias_variance", "f8"),  # of a UWB path [m^2]
+        ("first_path", "i8"),  # number of its anchor 0 among the paths of all sources
         ("gate", "f8", 3),  # chi-square threshold for 1, 2, 3 axes
         ("soft_nis", "f8"),
         ("R_BS", "f8", (3, 3)),
@@ -102,6 +104,7 @@ def build_sources(config: Config) -> Records:
     """
     names = fused_sensors(config)
     sources = np.zeros(len(names), SOURCE)
+    sources["first_path"] = MAX_ANCHORS * np.arange(len(names))
     for source, name in zip(sources, names, strict=True):
         for field, value in _row(name, config.sensor[name], config).items():
             if field == "anchors":
@@ -120,6 +123,7 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         "kind": int(kind),
         "enabled": name not in config.disabled,
         "sigma": sigma,
+        "bias_variance": _bias_sigma(spec, config) ** 2,
         "gate": [chi_square_threshold(dof, gate.probability) for dof in (1, 2, 3)],
         "soft_nis": gate.soft_sigma**2,
         "R_BS": spec.rotation_BS,
@@ -162,6 +166,12 @@ def _surface(sensor: str, name: str, config: Config) -> Surface:
         known = ", ".join(config.surface) or "none"
         raise ConfigError(f"sensor.{sensor} looks at surface {name!r}, which is not described; surfaces: {known}")
     return config.surface[name]
+
+
+def _bias_sigma(spec: AnySensor, config: Config) -> float:
+    if not isinstance(spec, Uwb):
+        return 0.0
+    return config.uwb.fix_bias_sigma_m if spec.measurement == "position" else config.uwb.bias_sigma_m
 
 
 def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:

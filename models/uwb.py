@@ -1,8 +1,8 @@
 r"""Ultra-wideband: range to an anchor, range difference (TDoA) and the receiver's own position.
 
-With the antenna at :math:`p_A = p + R\,l` and the additive bias state :math:`b`,
+With the antenna at :math:`p_A = p + R\,l` and a bias state :math:`b` per path (per anchor, or per axis of a fix),
 
-.. math:: r = |p_A - a| + b, \qquad d = |p_A - a_b| - |p_A - a_a| + b, \qquad z_i = p_{A,i} + b\,(e_i \cdot x)
+.. math:: r = |p_A - a| + b_a, \qquad d = |p_A - a_b| + b_b - |p_A - a_a| - b_a, \qquad z_i = p_{A,i} + b_i
 
 Reflections only lengthen paths, come in episodes and are the gate's and the supervisor's business, not the model's.
 """
@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
+from axialnav.models.jit import Integer, kernel
 from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, UWB_BIAS
 
 Array = NDArray[np.float64]
@@ -49,24 +49,44 @@ def _range_to(p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, sign: floa
 
 
 @kernel
-def uwb_range(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, H: Array) -> float:
-    """Predict the range to ``anchor`` (3,) [m] and add its Jacobian to the zeroed row ``H`` (18,)."""
-    H[E_UWB_BIAS] = 1.0
-    return float(_range_to(p_W, R_WB, lever_B, anchor, 1.0, H) + x[UWB_BIAS])
+def _add_bias(x: Array, path: Integer, sign: float, H: Array) -> float:
+    """Bias of a path (0..7; -1: it has no state) [m], and its entry in the Jacobian row."""
+    if path < 0:
+        return 0.0
+    H[E_UWB_BIAS + path] = sign
+    return float(sign * x[UWB_BIAS + path])
 
 
 @kernel
-def uwb_tdoa(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor_a: Array, anchor_b: Array, H: Array) -> float:
-    """Predict ``d(b) - d(a)`` [m] and add its Jacobian to the zeroed row ``H`` (18,)."""
-    H[E_UWB_BIAS] = 1.0
-    far = _range_to(p_W, R_WB, lever_B, anchor_b, 1.0, H)
-    near = _range_to(p_W, R_WB, lever_B, anchor_a, -1.0, H)
-    return float(far - near + x[UWB_BIAS])
+def uwb_range(x: Array, p_W: Array, R_WB: Array, lever_B: Array, anchor: Array, path: Integer, H: Array) -> float:
+    """Predict the range to ``anchor`` (3,) [m] and add its Jacobian to the zeroed row ``H`` (25,).
+
+    ``path`` is the number of its bias among the states, or -1.
+    """
+    return float(_range_to(p_W, R_WB, lever_B, anchor, 1.0, H) + _add_bias(x, path, 1.0, H))
 
 
 @kernel
-def uwb_position(x: Array, p_W: Array, R_WB: Array, lever_B: Array, axial: float, axis: int, H: Array) -> float:
-    """Predict coordinate ``axis`` of the antenna [m]; ``axial`` of the bias acts along it."""
+def uwb_tdoa(
+    x: Array,
+    p_W: Array,
+    R_WB: Array,
+    lever_B: Array,
+    anchor_a: Array,
+    anchor_b: Array,
+    path_a: Integer,
+    path_b: Integer,
+    H: Array,
+) -> float:
+    """Predict ``d(b) - d(a)`` [m] and add its Jacobian to the zeroed row ``H`` (25,); paths as in a range."""
+    far = _range_to(p_W, R_WB, lever_B, anchor_b, 1.0, H) + _add_bias(x, path_b, 1.0, H)
+    near = _range_to(p_W, R_WB, lever_B, anchor_a, -1.0, H) - _add_bias(x, path_a, -1.0, H)
+    return float(far - near)
+
+
+@kernel
+def uwb_position(x: Array, p_W: Array, R_WB: Array, lever_B: Array, axis: int, path: Integer, H: Array) -> float:
+    """Predict coordinate ``axis`` of the antenna [m]; ``path`` is the number of its bias, or -1."""
     u0, u1, u2 = 0.0, 0.0, 0.0
     if axis == 0:
         u0 = 1.0
@@ -75,8 +95,7 @@ def uwb_position(x: Array, p_W: Array, R_WB: Array, lever_B: Array, axial: float
     else:
         u2 = 1.0
     _add_direction(R_WB, lever_B, u0, u1, u2, H)
-    H[E_UWB_BIAS] = axial
     antenna = p_W[axis]
     for k in range(3):
         antenna += R_WB[axis, k] * lever_B[k]
-    return float(antenna + axial * x[UWB_BIAS])
+    return float(antenna + _add_bias(x, path, 1.0, H))

@@ -9,24 +9,26 @@ Source: Sola (2017), eq. 268-270; Bar-Shalom (2001), eq. 5.2.3-18 (Joseph form).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.models.jit import kernel
 from axialnav.models.rotations import rotate_in_body
-from axialnav.models.state import E_UWB_BIAS, QUAT
+from axialnav.models.state import E_UWB_BIAS, N_ERROR, QUAT
 
 Array = NDArray[np.float64]
-N = 18
+N = N_ERROR
 CORE = 9
 
 
 @kernel
 def predict_covariance(P: Array, F: Array, dt: float, uwb_decay: float, Q: Array) -> None:
-    """Replace ``P`` (18, 18) by ``Phi P Phi' + diag(Q)`` in place.
+    """Replace ``P`` (25, 25) by ``Phi P Phi' + diag(Q)`` in place.
 
     ``F`` (9, 3) holds the blocks written by :func:`axialnav.models.imu.strapdown`, ``uwb_decay`` the Gauss-Markov
-    factor of the UWB bias over the step, ``Q`` (18,) the discrete noise.
+    factor of the UWB biases over the step, ``Q`` (25,) the discrete noise.
     """
     for j in range(N):
         for i in range(3):
@@ -44,15 +46,17 @@ def predict_covariance(P: Array, F: Array, dt: float, uwb_decay: float, Q: Array
     for i in range(CORE):
         _predict_row(P[i], F, dt)
     for i in range(CORE):
-        P[i, E_UWB_BIAS] *= uwb_decay
-        for j in range(CORE, N):
+        for j in range(E_UWB_BIAS, N):
+            P[i, j] *= uwb_decay
+        for j in range(i + 1, N):
             P[j, i] = P[i, j]
-        for j in range(i + 1, CORE):
+    for i in range(CORE, E_UWB_BIAS):
+        for j in range(E_UWB_BIAS, N):
+            P[i, j] *= uwb_decay
             P[j, i] = P[i, j]
-    for i in range(CORE, N):
-        P[i, E_UWB_BIAS] *= uwb_decay
-    for i in range(CORE, N):
-        P[E_UWB_BIAS, i] *= uwb_decay
+    for i in range(E_UWB_BIAS, N):
+        for j in range(E_UWB_BIAS, N):
+            P[i, j] *= uwb_decay * uwb_decay
     for i in range(N):
         P[i, i] += Q[i]
 
@@ -72,7 +76,7 @@ def _predict_row(row: Array, F: Array, dt: float) -> None:
 
 @kernel
 def project(P: Array, H: Array, PHt: Array) -> float:
-    """Write ``P H'`` into ``PHt`` (18,) and return ``H P H'``; zeros of the row ``H`` (18,) cost nothing."""
+    """Write ``P H'`` into ``PHt`` (25,) and return ``H P H'``; zeros of the row ``H`` (25,) cost nothing."""
     for j in range(N):
         PHt[j] = 0.0
     for k in range(N):
@@ -88,16 +92,20 @@ def project(P: Array, H: Array, PHt: Array) -> float:
 
 @kernel
 def correct(x: Array, P: Array, PHt: Array, S: float, innovation: float, gain: Array) -> None:
-    """Scalar update of nominal state ``x`` (19,) and covariance ``P`` in place; ``gain`` (18,) is scratch.
+    """Scalar update of nominal state ``x`` (26,) and covariance ``P`` in place; ``gain`` (25,) receives the gain.
 
-    With the gain ``P H' / S`` the Joseph form is ``P - K (P H')'`` but for terms that are rounding errors.
+    With the gain ``P H' / S`` the Joseph form is ``P - r r'``, r = ``P H' / sqrt(S)``: one product an entry, and the
+    same bits on both sides of the diagonal.
     """
+    root = 1.0 / math.sqrt(S)
     for i in range(N):
-        gain[i] = PHt[i] / S
+        gain[i] = PHt[i] * root
     for i in range(N):
-        a = gain[i]
+        r = gain[i]
         for j in range(N):
-            P[i, j] -= a * PHt[j]
+            P[i, j] -= r * gain[j]
+    for i in range(N):
+        gain[i] *= root
     inject(x, gain, innovation)
 
 

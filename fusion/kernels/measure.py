@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.fusion.kernels.paths import place_of
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
@@ -31,20 +34,24 @@ SIGN_SIGMAS = 2.0
 
 
 @kernel
-def measure(s: Record, seen: Record, values: Array, x: Array, P: Array, m: Record, w: Record, c: Record) -> int:
+def measure(
+    t_ns: int, s: Record, seen: Record, values: Array, x: Array, P: Array, m: Record, w: Record, c: Record
+) -> int:
     """Evaluate one event; return its number of axes, or minus the :class:`Reason` why it cannot be used.
 
-    ``w.z``, ``w.h``, ``w.variance`` receive reading, prediction and noise variance per axis, ``w.H`` the Jacobian rows.
+    ``w.z``, ``w.h``, ``w.variance`` receive reading, prediction and noise variance per axis, ``w.H`` the Jacobian rows,
+    ``w.repeated`` how many readings of the source say the same thing.
     ``w.p`` and ``w.R`` hold the position at the stamp and the attitude.
     """
     for i in range(3):
         for k in range(N_ERROR):
             w.H[i, k] = 0.0
     kind = s.kind
+    w.repeated = 1.0
     if kind == UWB_TDOA:
-        return _measure_tdoa(s, values, x, w)
+        return _measure_tdoa(t_ns, s, seen, values, x, m, w, c)
     if kind == UWB_RANGE:
-        return _measure_uwb_range(s, values, x, w)
+        return _measure_uwb_range(t_ns, s, seen, values, x, m, w, c)
     if kind == FLOW:
         return _measure_flow(s, values, x, m, w)
     if kind == BLUR:
@@ -52,11 +59,12 @@ def measure(s: Record, seen: Record, values: Array, x: Array, P: Array, m: Recor
     if kind == RANGE:
         return _measure_range(s, values, x, w)
     if kind == UWB_POSITION:
-        return _measure_fix(s, values, x, w, c)
+        return _measure_fix(t_ns, s, seen, values, x, m, w, c)
     if kind == HEIGHT:
         w.z[0] = values[0]
         w.h[0] = height(w.p, seen.datum_m, w.H[0])
         w.variance[0] = variance_of(values[1], s.sigma)
+        w.repeated = repetition(seen.gap_s, c.height_correlation_s)
         return 1
     for i in range(2):
         w.h[i] = tilt(w.R, i, w.H[i])
@@ -96,36 +104,62 @@ def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
 
 
 @kernel
-def _measure_uwb_range(s: Record, values: Array, x: Array, w: Record) -> int:
+def repetition(gap_s: float, correlation_s: float) -> float:
+    """How many readings that come every ``gap_s`` say the same thing.
+
+    Errors with the correlation exp(-dt / tau) average as slowly as white ones of a variance coth(dt / 2 tau) times
+    larger: 1 for slow sources, 2 tau / dt for fast ones.
+    """
+    if not (gap_s > 0.0 and correlation_s > 0.0):  # also before the second reading, when the gap is not known
+        return 1.0
+    return 1.0 / math.tanh(0.5 * gap_s / correlation_s)
+
+
+@kernel
+def _uwb_variance(claimed_sigma: float, place: int, other: int, s: Record, seen: Record, w: Record, c: Record) -> float:
+    """White variance of a reading; paths without a place add their bias and make readings repeat each other."""
+    variance = variance_of(claimed_sigma, s.sigma)
+    if place < 0 or other < 0:
+        w.repeated = repetition(seen.gap_s, c.uwb_correlation_s)
+        variance += ((1.0 if place < 0 else 0.0) + (1.0 if other < 0 else 0.0)) * s.bias_variance
+    return variance
+
+
+@kernel
+def _measure_uwb_range(
+    t_ns: int, s: Record, seen: Record, values: Array, x: Array, m: Record, w: Record, c: Record
+) -> int:
     a = int(values[0])
     if not 0 <= a < s.n_anchors:
         return -UNKNOWN_ANCHOR
     w.z[0] = values[1]
     if not values[1] > 0.0:
         return -OUT_OF_RANGE
-    w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], w.H[0])
-    w.variance[0] = variance_of(values[2], s.sigma)
+    place = place_of(t_ns, a, s, m, c)
+    w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], place, w.H[0])
+    w.variance[0] = _uwb_variance(values[2], place, 0, s, seen, w, c)
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
 @kernel
-def _measure_tdoa(s: Record, values: Array, x: Array, w: Record) -> int:
+def _measure_tdoa(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m: Record, w: Record, c: Record) -> int:
     a, b = int(values[0]), int(values[1])
     if not (0 <= a < s.n_anchors and 0 <= b < s.n_anchors):
         return -UNKNOWN_ANCHOR
     w.z[0] = values[2]
-    w.h[0] = uwb_tdoa(x, w.p, w.R, s.lever_B, s.anchors[a], s.anchors[b], w.H[0])
-    w.variance[0] = variance_of(values[3], s.sigma)
+    place_a, place_b = place_of(t_ns, a, s, m, c), place_of(t_ns, b, s, m, c)
+    w.h[0] = uwb_tdoa(x, w.p, w.R, s.lever_B, s.anchors[a], s.anchors[b], place_a, place_b, w.H[0])
+    w.variance[0] = _uwb_variance(values[3], place_a, place_b, s, seen, w, c)
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
 @kernel
-def _measure_fix(s: Record, values: Array, x: Array, w: Record, c: Record) -> int:
+def _measure_fix(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m: Record, w: Record, c: Record) -> int:
     for i in range(3):
-        axial = c.axial_x if i == 0 else (c.axial_y if i == 1 else c.axial_z)
+        place = place_of(t_ns, i, s, m, c)
         w.z[i] = values[i]
-        w.h[i] = uwb_position(x, w.p, w.R, s.lever_B, axial, i, w.H[i])
-        w.variance[i] = variance_of(values[3 + i], s.sigma)
+        w.h[i] = uwb_position(x, w.p, w.R, s.lever_B, i, place, w.H[i])
+        w.variance[i] = _uwb_variance(values[3 + i], place, 0, s, seen, w, c)
     return 3
 
 

@@ -19,6 +19,9 @@ from axialnav.models.state import (
     E_UWB_BIAS,
     E_VEL,
     E_WALL_OFFSET,
+    N_BIASES,
+    UWB_BIAS,
+    VEL,
 )
 
 Array = NDArray[np.float64]
@@ -36,8 +39,16 @@ def rotate_sample(values: Array, R_BS: Array, out: Array) -> None:
 
 
 @kernel
+def bias_decay(x: Array, dt: float, c: Record) -> float:
+    """What is left after ``dt`` [s] of the biases of UWB paths: they change with time and with the way flown."""
+    way = dt * math.sqrt(x[VEL] * x[VEL] + x[VEL + 1] * x[VEL + 1] + x[VEL + 2] * x[VEL + 2])
+    return math.exp(-dt / c.uwb_bias_time_s - way / c.uwb_bias_length_m)
+
+
+@kernel
 def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: Record) -> None:
     """Predict filter ``row`` over ``dt`` with the mean sample in ``w.mean_imu``; ``fault`` selects the noise."""
+    decay = bias_decay(m.x[row], dt, c)
     strapdown(m.x[row], w.mean_imu[0:3], w.mean_imu[3:6], dt, c.gravity_m_s2, w.R, w.F)
     accel = c.fault_accel_variance if fault else c.accel_variance
     accel_walk = c.fault_accel_walk if fault else c.accel_walk
@@ -54,11 +65,11 @@ def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: 
         w.Q[E_ATT + i] = gyro * dt
         w.Q[E_GYRO_BIAS + i] = c.gyro_walk * dt
         w.Q[E_ACCEL_BIAS + i] = accel_walk * dt
-    decay = math.exp(-dt / c.uwb_bias_time_s)
     w.Q[E_BLUR_SCALE] = c.blur_scale_walk * dt
-    w.Q[E_UWB_BIAS] = c.uwb_bias_variance * (1.0 - decay * decay)
+    for k in range(N_BIASES):
+        w.Q[E_UWB_BIAS + k] = m.path_variance[k] * (1.0 - decay * decay)
+        m.x[row, UWB_BIAS + k] *= decay
     w.Q[E_WALL_OFFSET] = c.wall_offset_walk * dt
-    m.x[row, E_UWB_BIAS + 1] *= decay
     predict_covariance(m.P[row], w.F, dt, decay, w.Q)
 
 

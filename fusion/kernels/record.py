@@ -10,11 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.fusion.kernels.paths import forget_bias
+from axialnav.fusion.kernels.propagate import bias_decay
 from axialnav.fusion.kernels.rival import copy_filter
 from axialnav.fusion.kernels.run import run
-from axialnav.fusion.kernels.smooth import IDENTITY, INERTIAL, REANCHORING
+from axialnav.fusion.kernels.smooth import IDENTITY, INERTIAL, NEW_PATHS, REANCHORING
 from axialnav.models.imu import strapdown
 from axialnav.models.jit import Record, Records, kernel
+from axialnav.models.state import N_BIASES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,11 +48,12 @@ def advance(
 @kernel
 def record(
     start: int, stop: int, t_ns: Ints, source: Ints, values: Array, sources: Records, core: Records,
-    memory: Records, scratch: Records, settings: Records, track: Array, log: Array, imu: Array, steps: Records,
+    memory: Records, scratch: Records, settings: Records, track: Array, log: Array, imu: Array, paths: Ints,
+    steps: Records,
 ) -> int:  # fmt: skip
     """Run the events ``start:stop`` and write a row of ``steps`` per step; return their number.
 
-    ``track`` (1, 45) and ``log`` (1, 10) are overwritten by each event; ``imu`` (6,) is scratch.
+    ``track`` (1, 59) and ``log`` (1, 10) are overwritten by each event; ``imu`` (6,) and ``paths`` (8,) are scratch.
     """
     m, w, c = core[0], scratch[0], settings[0]
     n, rows, trial_from = 0, 0, 0
@@ -58,10 +62,13 @@ def record(
         fault, resets, t_before, started, pair = m.imu_fault, m.resets, m.t_imu, m.started, 1 + m.on_trial
         for k in range(6):
             imu[k] = m.imu[k]
+        for k in range(N_BIASES):
+            paths[k] = m.path[k]
         for row in range(pair):
             copy_filter(m.x[row], m.P[row], s.x_before[row], s.P_before[row])
         one = slice(e, e + 1)
         run(t_ns[one], source[one], values[one], sources, core, memory, scratch, settings, track, log)
+        new = new_paths(paths, m.path, s.new)
         if sources[source[e]].kind == 0:
             s.dt = (m.t_imu - t_before) * 1e-9 if started == 1 else 0.0
             s.kind = INERTIAL if s.dt > 0.0 else IDENTITY
@@ -69,9 +76,14 @@ def record(
             rows += 1
         elif m.resets != resets:
             s.dt, s.kind, s.track_row = 0.0, REANCHORING, -1
+        elif new:
+            s.dt, s.kind, s.track_row = 0.0, NEW_PATHS, -1
         else:
             continue
         for row in range(pair):
+            if s.kind == NEW_PATHS:
+                _before_the_update(row, s, m)
+                continue
             copy_filter(m.x[row], m.P[row], s.x_after[row], s.P_after[row])
             if s.kind == INERTIAL:
                 _transition(s, row, imu, m, w, c)
@@ -86,9 +98,29 @@ def record(
 
 
 @kernel
+def new_paths(before: Ints, after: Ints, new: Ints) -> bool:
+    """Mark in ``new`` (8,) the places that were given to another path; whether there are any."""
+    found = False
+    for k in range(N_BIASES):
+        new[k] = 1 if before[k] != after[k] else 0
+        found = found or new[k] == 1
+    return found
+
+
+@kernel
+def _before_the_update(row: int, s: Record, m: Record) -> None:
+    """The state after biases were started anew and before the reading that was the reason for it is fused."""
+    copy_filter(s.x_before[row], s.P_before[row], s.x_after[row], s.P_after[row])
+    for k in range(N_BIASES):
+        if s.new[k] == 1:
+            forget_bias(s.x_after[row], s.P_after[row], k, m.path_variance[k])
+
+
+@kernel
 def _transition(s: Record, row: int, imu: Array, m: Record, w: Record, c: Record) -> None:
     """Blocks of the transition of filter ``row`` over the step that ``s`` describes."""
     for k in range(6):
         w.mean_imu[k] = 0.5 * (imu[k] + m.imu[k])
     x = s.x_before[row].copy()
+    s.decay[row] = bias_decay(x, s.dt, c)
     strapdown(x, w.mean_imu[0:3], w.mean_imu[3:6], s.dt, c.gravity_m_s2, w.R, s.F[row])

@@ -8,7 +8,7 @@ With the filter's state and covariance before (+) and after (-) a step and its t
     P^s_k = P^+_k + C_k\,(P^s_{k+1} - P^-_{k+1})\,C_k^\top .
 
 Attitudes are subtracted and added on the group, and covariances are carried between the tangent spaces.  Re-anchoring
-is the step that forgets the position: everything but the position passes through it.
+is the step that forgets the position, a new UWB path one that forgets a bias: everything else passes through.
 
 Source: Rauch, Tung, Striebel (1965); Sarkka (2013), section 9.1; for the attitude Sola (2017), section 6.3.1.
 """
@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from axialnav.fusion.memory import TRACK_POS_CROSS, TRACK_STATE, TRACK_VARIANCE, TRACK_VEL_CROSS
 from axialnav.models.jit import Record, Records, kernel
 from axialnav.models.rotations import rotate_in_body
-from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, E_VEL, N_ERROR, N_NOMINAL, QUAT
+from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, E_VEL, N_BIASES, N_ERROR, N_NOMINAL, QUAT
 from axialnav.models.tangent import inverse_right_jacobian, right_jacobian, rotation_between
 
 Array = NDArray[np.float64]
-N = 18
-IDENTITY, INERTIAL, REANCHORING = 0, 1, 2
+N = N_ERROR
+IDENTITY, INERTIAL, REANCHORING, NEW_PATHS = 0, 1, 2, 3
 MIN_PIVOT = 1e-13  # of a correlation matrix: directions below are known exactly and stay as they are
 
 STEP: Final = np.dtype(
@@ -38,6 +38,8 @@ STEP: Final = np.dtype(
         ("chosen", "i8"),  # which of the two filters became the estimate
         ("track_row", "i8"),  # -1 where the step ends at no inertial sample
         ("dt", "f8"),
+        ("decay", "f8", 2),  # of the UWB biases
+        ("new", "i8", N_BIASES),  # 1 where a bias was started anew
         ("x_before", "f8", (2, N_NOMINAL)),
         ("P_before", "f8", (2, N_ERROR, N_ERROR)),
         ("x_after", "f8", (2, N_NOMINAL)),
@@ -67,7 +69,7 @@ WORK: Final = np.dtype(
 
 
 @kernel
-def smooth_back(steps: Records, n: int, work: Records, c: Record, track: Array) -> None:
+def smooth_back(steps: Records, n: int, work: Records, track: Array) -> None:
     """Go back over ``steps[:n]`` from the smoothed state in ``work``, which ends up before the first of them.
 
     Rows of ``track`` that belong to inertial samples are overwritten; flags and reset counts stay the filter's.
@@ -80,11 +82,10 @@ def smooth_back(steps: Records, n: int, work: Records, c: Record, track: Array) 
         if s.kind == IDENTITY:
             continue
         r = s.chosen
-        decay = math.exp(-s.dt / c.uwb_bias_time_s)
         if s.kind == INERTIAL:
-            transition_times(s.P_before[r], s.F[r], s.dt, decay, w.X)
+            transition_times(s.P_before[r], s.F[r], s.dt, s.decay[r], w.X)
         else:
-            _forget_position(s.P_before[r], w.X)
+            _forget(s.P_before[r], s.kind == REANCHORING, s.new, w.X)
         _step_back(s.x_before[r], s.P_before[r], s.x_after[r], s.P_after[r], w)
 
 
@@ -119,15 +120,16 @@ def _step_back(x_before: Array, P_before: Array, x_after: Array, P_after: Array,
 
 @kernel
 def transition_times(P: Array, F: Array, dt: float, decay: float, out: Array) -> None:
-    """Write ``Phi P`` (18, 18) into ``out``; the blocks are those of :func:`axialnav.models.imu.strapdown`."""
+    """Write ``Phi P`` (25, 25) into ``out``; the blocks are those of :func:`axialnav.models.imu.strapdown`."""
     for j in range(N):
         for i in range(3):
             out[i, j] = P[i, j] + dt * P[3 + i, j]
             out[3 + i, j] = P[3 + i, j]
             out[6 + i, j] = -dt * P[9 + i, j]
-        for i in range(9, N):
+        for i in range(9, E_UWB_BIAS):
             out[i, j] = P[i, j]
-        out[E_UWB_BIAS, j] = decay * P[E_UWB_BIAS, j]
+        for i in range(E_UWB_BIAS, N):
+            out[i, j] = decay * P[i, j]
     for i in range(3):
         for k in range(3):
             f, b, a = F[i, k], F[3 + i, k], F[6 + i, k]
@@ -137,13 +139,18 @@ def transition_times(P: Array, F: Array, dt: float, decay: float, out: Array) ->
 
 
 @kernel
-def _forget_position(P: Array, out: Array) -> None:
+def _forget(P: Array, position: bool, new: Array, out: Array) -> None:
+    """What a step that forgets the position, or the biases marked in ``new``, lets through."""
     for i in range(N):
         for j in range(N):
             out[i, j] = P[i, j]
-    for i in range(3):
-        for j in range(N):
-            out[E_POS + i, j] = 0.0
+    for j in range(N):
+        if position:
+            for i in range(3):
+                out[E_POS + i, j] = 0.0
+        for k in range(N_BIASES):
+            if new[k] == 1:
+                out[E_UWB_BIAS + k, j] = 0.0
 
 
 @kernel
@@ -166,9 +173,9 @@ def carry(P: Array, J: Array, out: Array) -> None:
 
 @kernel
 def factorise(P: Array, scale: Array, inverse: Array, U: Array) -> None:
-    """Cholesky factor of the correlation matrix of ``P`` (18, 18): ``U' U``, upper triangle of ``U``.
+    """Cholesky factor of the correlation matrix of ``P`` (25, 25): ``U' U``, upper triangle of ``U``.
 
-    ``scale`` (18,) gets 1 / sigma and ``inverse`` (18,) one over the pivots.  Directions without uncertainty of their
+    ``scale`` (25,) gets 1 / sigma and ``inverse`` (25,) one over the pivots.  Directions without uncertainty of their
     own get pivots of zero, so that a semi-definite ``P`` does no harm.  Rows are updated, not entries: adding vectors
     is faster than adding up products.
     """
@@ -192,7 +199,7 @@ def factorise(P: Array, scale: Array, inverse: Array, U: Array) -> None:
 
 @kernel
 def solve(U: Array, scale: Array, inverse: Array, X: Array) -> None:
-    """Solve ``P Y = X`` (18, 18) in place with what :func:`factorise` wrote."""
+    """Solve ``P Y = X`` (25, 25) in place with what :func:`factorise` wrote."""
     for i in range(N):
         f = scale[i]
         for j in range(N):
@@ -242,7 +249,7 @@ def _add_quadratic(P: Array, X: Array, D: Array, T: Array, out: Array) -> None:
 
 @kernel
 def _subtract(x: Array, base: Array, delta: Array) -> None:
-    """Write the error state (18,) that takes ``base`` (19,) to ``x`` (19,) into ``delta``."""
+    """Write the error state (25,) that takes ``base`` (26,) to ``x`` (26,) into ``delta``."""
     for i in range(6):
         delta[i] = x[i] - base[i]
     rotation_between(base[QUAT : QUAT + 4], x[QUAT : QUAT + 4], delta[E_ATT : E_ATT + 3])
@@ -252,7 +259,7 @@ def _subtract(x: Array, base: Array, delta: Array) -> None:
 
 @kernel
 def _add(base: Array, delta: Array, x: Array) -> None:
-    """Write ``base`` (19,) moved by the error state ``delta`` (18,) into ``x``."""
+    """Write ``base`` (26,) moved by the error state ``delta`` (25,) into ``x``."""
     for i in range(N_NOMINAL):
         x[i] = base[i]
     for i in range(6):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import correct, project
-from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_RANGE, measure
+from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_RANGE, measure, repetition
 from axialnav.fusion.memory import LOG_CODE, LOG_GATE, LOG_INNOVATION, LOG_NIS, LOG_VARIANCE, LOG_WEIGHT, LOG_WIDTH
 from axialnav.fusion.outcome import Reason
 from axialnav.models.jit import Record, kernel
@@ -38,36 +38,24 @@ def redescend(nis_per_axis: float, soft_nis: float) -> float:
 
 
 @kernel
-def repetition(gap_s: float, correlation_s: float) -> float:
-    """How many readings that come every ``gap_s`` say the same thing.
-
-    Errors with the correlation exp(-dt / tau) average as slowly as white ones of a variance coth(dt / 2 tau) times
-    larger: 1 for slow sources, 2 tau / dt for fast ones.
-    """
-    if not (gap_s > 0.0 and correlation_s > 0.0):  # also before the second reading, when the gap is not known
-        return 1.0
-    return 1.0 / math.tanh(0.5 * gap_s / correlation_s)
-
-
-@kernel
 def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
     """Try one reading on filter ``row``; leave its record in ``w.row`` (10,) and return its log-likelihood.
 
-    The log-likelihood is bounded (the NIS counts at most as much as the gate) and divided by the number of readings
-    that repeat each other.  Axes of one reading are gated together and fused one after the other.
+    The log-likelihood is bounded (the NIS counts at most as much as the gate) and that of UWB divided by the number of
+    readings that repeat each other: what bias states leave of their likeness must not decide over the accelerometer.  Axes of one reading are gated together and fused one after the other.
     """
     x, P = m.x[row], m.P[row]
     since_imu = (t_ns - m.t_imu) * 1e-9
     for i in range(3):
         w.p[i] = x[POS + i] + since_imu * x[VEL + i]
     matrix_from_quaternion(x[QUAT], x[QUAT + 1], x[QUAT + 2], x[QUAT + 3], w.R)
-    axes = measure(s, seen, values, x, P, m, w, c)
+    axes = measure(t_ns, s, seen, values, x, P, m, w, c)
     for k in range(LOG_WIDTH):
         w.row[k] = 0.0
     w.row[LOG_CODE] = axes
     if axes < 0:
         return 0.0
-    repeated = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
+    repeated = w.repeated
     nis, log_det = _innovate(axes, repeated, P, w)
     if not np.isfinite(nis):
         w.row[LOG_CODE] = -NOT_FINITE
@@ -82,7 +70,8 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
                 m.correction[k] += w.step[E_VEL + k]
     elif row == 0:
         _note_refused(axes, repeated, REFUSED_COUNTS * math.sqrt(gate / nis), P, m, w)
-    return float(-0.5 * (min(nis, gate) + log_det) / repeated)
+    alike = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
+    return float(-0.5 * (min(nis, gate) + log_det) / alike)
 
 
 @kernel

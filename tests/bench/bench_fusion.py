@@ -71,19 +71,19 @@ def kernel_step_rows(prepared: Prepared, count: int = STEPS) -> Iterator[list[st
 
 
 def filterpy_rows(count: int) -> Iterator[list[str]]:
-    """The same two steps in filterpy's extended filter of 18 states."""
+    """The same two steps in filterpy's extended filter of 25 states."""
     from filterpy.kalman import ExtendedKalmanFilter
 
     def fresh() -> ExtendedKalmanFilter:
-        ekf = ExtendedKalmanFilter(dim_x=18, dim_z=1)
-        ekf.F, ekf.Q, ekf.R = np.eye(18) + np.eye(18, k=3) * 0.004, np.eye(18) * 1e-6, np.eye(1) * 0.02
+        ekf = ExtendedKalmanFilter(dim_x=25, dim_z=1)
+        ekf.F, ekf.Q, ekf.R = np.eye(25) + np.eye(25, k=3) * 0.004, np.eye(25) * 1e-6, np.eye(1) * 0.02
         return ekf
 
-    H, z = np.zeros((1, 18)), np.zeros(1)
+    H, z = np.zeros((1, 25)), np.zeros(1)
     H[0, [0, 1, 2, 6, 7, 8, 16]] = 0.5
     actions: dict[str, Callable[[ExtendedKalmanFilter], None]] = {
-        "filterpy: predict, 18 states": lambda ekf: ekf.predict(),
-        "filterpy: scalar update, 18 states": lambda ekf: ekf.update(z, lambda x: H, lambda x: H @ x),
+        "filterpy: predict, 25 states": lambda ekf: ekf.predict(),
+        "filterpy: scalar update, 25 states": lambda ekf: ekf.update(z, lambda x: H, lambda x: H @ x),
     }
     for name, action in actions.items():
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from axialnav.fusion.config import Config, Gate, Initial, UwbTuning
+from axialnav.fusion.config import Config, Gate, ImuTuning, Initial, UwbTuning
 from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, Flow, Imu, RangeFinder, Surface, Uwb
 
 Array = NDArray[np.float64]
@@ -307,9 +307,12 @@ def textbook(config: Config) -> Config:
     """The plain extended Kalman filter: no redescending weights, readings independent, the accelerometer believed."""
     change = msgspec.structs.replace
     wide = Gate(probability=NEVER, soft_sigma=1e9)
+    height = change(config.height, gate=wide, correlation_time_s=0.0)
     return change(
         config,
-        uwb=UwbTuning(correlation_time_s=0.0, sigma_m=0.01, fix_sigma_m=0.01, gate=wide),
-        **{name: change(getattr(config, name), gate=wide) for name in ("flow", "range", "height", "attitude")},
+        uwb=UwbTuning(bias_sigma_m=0.0, correlation_time_s=0.0, sigma_m=0.01, fix_sigma_m=0.01, gate=wide),
+        imu=ImuTuning(accel_noise_scale=1.0, gyro_noise_scale=1.0),
+        **{name: change(getattr(config, name), gate=wide) for name in ("flow", "range", "attitude")},
+        height=height,
         imu_fault=change(config.imu_fault, enabled=False),
     )

@@ -12,7 +12,7 @@ from axialnav.fusion.kernels.update import fuse
 from axialnav.fusion.memory import LOG_NIS, LOG_VARIANCE, build_settings, new_memory, new_scratch
 from axialnav.fusion.sources import build_sources, fused_sensors
 from axialnav.models.rig import Imu, Uwb
-from axialnav.models.state import N_ERROR
+from axialnav.models.state import E_UWB_BIAS, N_ERROR, UWB_BIAS
 from tests.fusion.made_flights import ANCHORS, LEVER, NEVER, transform
 from tests.fusion.test_covariance_kernels import blocks, dense_transition, random_covariance
 from tests.models.states import central_differences, minus, random_state, rotation_of
@@ -27,7 +27,8 @@ def config(measurement: str) -> Config:
         "uwb0": Uwb(measurement=measurement, anchors=dict(ANCHORS), T_BS=transform(lever=LEVER), sigma_m=SIGMA_M),
     }
     gate = Gate(probability=NEVER, soft_sigma=1e9)
-    return Config(sensor=sensors, uwb=UwbTuning(sigma_m=0.01, fix_sigma_m=0.01, correlation_time_s=0.0, gate=gate))
+    uwb = UwbTuning(sigma_m=0.01, fix_sigma_m=0.01, bias_sigma_m=0.1, fix_bias_sigma_m=0.1, gate=gate)
+    return Config(sensor=sensors, uwb=uwb)
 
 
 class Kernel:
@@ -38,7 +39,7 @@ class Kernel:
         self.source = build_sources(c)[fused_sensors(c).index("uwb0")]
         self.settings, self.memory, self.scratch = build_settings(c)[0], new_memory(2), new_scratch()[0]
         self.memory.core["x"][0, 0], self.memory.core["P"][0, 0] = x, P
-        self.memory.sources["gap_s"] = 0.1
+        self.memory.core["path"], self.memory.core["path_heard"] = self.source["first_path"] + np.arange(8), 0
 
     def fuse(self, values: list[float]) -> float:
         row = np.full(8, np.nan)
@@ -64,12 +65,12 @@ def antenna(x: np.ndarray) -> np.ndarray:
 
 
 def predicted_range(x: np.ndarray, a: int) -> float:
-    return float(np.linalg.norm(antenna(x) - ANCHOR_M[a]) + x[17])
+    return float(np.linalg.norm(antenna(x) - ANCHOR_M[a]) + x[UWB_BIAS + a])
 
 
 def fix_of(x: np.ndarray) -> np.ndarray:
-    """What a receiver reports; the bias acts along the corridor."""
-    return antenna(x) + np.array([x[17], 0.0, 0.0])
+    """What a receiver reports, with a bias on each axis."""
+    return antenna(x) + x[UWB_BIAS : UWB_BIAS + 3]
 
 
 def small_covariance(rng: np.random.Generator) -> np.ndarray:
@@ -139,7 +140,7 @@ def test_a_long_linear_run_stays_with_filterpy() -> None:
     other = KalmanFilter(dim_x=N_ERROR, dim_z=3)
     other.x, other.P, other.R = np.zeros(N_ERROR), P.copy(), np.eye(3) * SIGMA_M**2
     other.H = np.zeros((3, N_ERROR))
-    other.H[:, :3], other.H[0, 16] = np.eye(3), 1.0
+    other.H[:, :3], other.H[:, E_UWB_BIAS : E_UWB_BIAS + 3] = np.eye(3), np.eye(3)
     F, dt, Q = np.zeros((9, 3)), 0.05, np.full(N_ERROR, 1e-4)
     F[3:6], F[6:9] = np.eye(3) * dt, np.eye(3)
     Q[6:12] = 0.0
@@ -149,9 +150,9 @@ def test_a_long_linear_run_stays_with_filterpy() -> None:
         other.predict()
         ours.x[:3] += dt * ours.x[3:6]
         ours.x[3:6] -= dt * ours.x[13:16]
-        ours.x[17] *= 0.99
+        ours.x[UWB_BIAS:] *= 0.99
         start = x.copy()
-        start[:3], start[3:6], start[17] = x[:3] + dt * x[3:6], x[3:6] - dt * x[13:16], 0.99 * x[17]
+        start[:3], start[3:6], start[UWB_BIAS:] = x[:3] + dt * x[3:6], x[3:6] - dt * x[13:16], 0.99 * x[UWB_BIAS:]
         x = start
         z = fix_of(x) + rng.normal(0, 0.3, 3)
         ours.fuse(z.tolist())

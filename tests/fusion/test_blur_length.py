@@ -98,4 +98,4 @@ def test_many_lengths_find_the_speed() -> None:
                 assert estimator.push(blur).verdict is Verdict.FUSED
         state = estimator.state()
         assert state.axial_velocity_m_s == pytest.approx(2.0 * sign, abs=3.0 * state.sigma_axial_velocity_m_s)
-        assert state.sigma_axial_velocity_m_s < 0.15  # it was 0.3; the distance to the wall is not measured here
+        assert state.sigma_axial_velocity_m_s < 0.17  # it was 0.3; the distance to the wall is not measured here

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from axialnav.fusion.kernels.covariance import correct, inject, predict_covariance, project
 from axialnav.models.imu import strapdown
-from axialnav.models.state import N_ERROR, zero_state
+from axialnav.models.state import E_UWB_BIAS, N_ERROR, N_NOMINAL, zero_state
 
 EYE = np.eye(N_ERROR)
 
@@ -24,7 +24,7 @@ def dense_transition(F: np.ndarray, dt: float, decay: float) -> np.ndarray:
     Phi[0:3, 3:6] = dt * np.eye(3)
     Phi[3:6, 6:9], Phi[3:6, 12:15] = F[0:3], -F[3:6]
     Phi[6:9, 6:9], Phi[6:9, 9:12] = F[6:9], -dt * np.eye(3)
-    Phi[16, 16] = decay
+    Phi[range(E_UWB_BIAS, N_ERROR), range(E_UWB_BIAS, N_ERROR)] = decay
     return Phi
 
 
@@ -90,7 +90,7 @@ def test_the_joseph_form_holds_for_a_gain_that_is_not_optimal() -> None:
 
 def test_injection_turns_in_body_axes_and_adds_the_rest() -> None:
     rng = np.random.default_rng(5)
-    x, gain = rng.normal(size=19), rng.normal(size=N_ERROR)
+    x, gain = rng.normal(size=N_NOMINAL), rng.normal(size=N_ERROR)
     attitude = Rotation.random(rng=rng)
     x[6:10] = attitude.as_quat(scalar_first=True)
     out = x.copy()

@@ -9,7 +9,8 @@ from scipy.stats import chi2
 from axialnav.fusion.batch import run_batch
 from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.config import Config, Gate, UwbTuning
-from axialnav.fusion.kernels.update import redescend, repetition
+from axialnav.fusion.kernels.measure import repetition
+from axialnav.fusion.kernels.update import redescend
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import build_sources
 from axialnav.models.rig import Imu, Uwb

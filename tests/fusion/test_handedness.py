@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from axialnav.fusion.batch import run_batch
+from axialnav.fusion.batch import LEFT_HANDED_EVIDENCE, run_batch
 from axialnav.fusion.config import Config, Corridor, Initial, Section
-from axialnav.fusion.handedness import MIRROR, is_undecided, mirror_config, mirror_tables, mirror_track
+from axialnav.fusion.handedness import MIRROR, explains_better, is_undecided, mirror_config, mirror_tables, mirror_track
 from axialnav.models.rig import Surface
 from tests.fusion.made_flights import ANCHORS, MadeFlight, Scene, fly
 
@@ -45,14 +45,13 @@ def test_the_track_comes_back_in_the_frame_of_the_survey() -> None:
 
 def test_told_the_wrong_hand_the_filter_explains_the_readings_worse() -> None:
     flight = surveyed(MIRRORED)
-    fused = {}
+    logs = {}
     for hand in ("left", "right"):
         config = msgspec.structs.replace(flight.config, handedness=hand)
-        log = run_batch(config, flight.tables).log
-        mine = log.source == log.sensors.index("uwb0")
-        fused[hand] = float((log.weight[mine] > 0.5).mean())
-    assert fused["left"] > 0.8
-    assert fused["left"] > fused["right"] + 0.1
+        logs[hand] = run_batch(config, flight.tables).log
+    mine = logs["left"].source == logs["left"].sensors.index("uwb0")
+    assert (logs["left"].weight[mine] > 0.5).mean() > 0.8
+    assert explains_better(logs["left"], logs["right"]) > LEFT_HANDED_EVIDENCE
 
 
 def test_a_flight_that_names_its_start_or_its_hand_has_nothing_to_decide() -> None:

@@ -61,9 +61,9 @@ def test_switched_off_it_stays_lost(uwb: str) -> None:
     never = {"supervisor.reanchor_aided_s": NEVER_S, "supervisor.reanchor_alone_s": NEVER_S}
     result = run_batch(flight.config.with_params(never), flight.tables)
     assert result.track.resets.max() == 0
-    assert miss_m(flight, result).min() > 0.6 * CASES[uwb]
+    assert miss_m(flight, result).min() > 0.4 * CASES[uwb]
     mine = result.log.source == result.log.sensors.index(uwb)
-    assert (result.log.verdict[mine] == Verdict.GATED).mean() > 0.9
+    assert (result.log.verdict[mine] == Verdict.GATED).mean() > 0.8
 
 
 def test_the_last_reset_is_told_with_the_state() -> None:

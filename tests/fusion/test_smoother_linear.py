@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from axialnav.fusion.kernels.smooth import factorise, smooth_back, solve
-from tests.fusion.linear_flights import UNITS, as_records, dense_answer, filtered, make_linear, states_of
+from axialnav.models.state import E_UWB_BIAS
+from tests.fusion.linear_flights import UNITS, N, as_records, dense_answer, filtered, make_linear, states_of
 from tests.fusion.test_covariance_kernels import random_covariance
 
 STEPS = 25
@@ -21,11 +22,11 @@ def test_equals_the_smoother_of_filterpy() -> None:
     system = make_linear(1, STEPS)
     kf, x, P, _, _ = filtered(system)
     # filterpy takes the transition that leads to an instant under that instant's index
-    led = [np.eye(18), *system.Phi]
-    noise = [np.zeros((18, 18)), *system.Q]
+    led = [np.eye(N), *system.Phi]
+    noise = [np.zeros((N, N)), *system.Q]
     expected, P_expected, _, _ = kf.rts_smoother(x[..., None], P, led, noise, inv=scaled_inverse)
-    steps, work, settings, track = as_records(system)
-    smooth_back(steps, STEPS, work, settings[0], track)
+    steps, work, track = as_records(system)
+    smooth_back(steps, STEPS, work, track)
     mean, variance = states_of(track)
     np.testing.assert_allclose(mean[1:] / UNITS, expected[1:, :, 0] / UNITS, atol=1e-9)
     np.testing.assert_allclose(
@@ -34,13 +35,13 @@ def test_equals_the_smoother_of_filterpy() -> None:
     np.testing.assert_allclose(work["P"][0] / np.outer(UNITS, UNITS), P_expected[0] / np.outer(UNITS, UNITS), atol=1e-8)
 
 
-@pytest.mark.parametrize("reanchored_at", [None, 11])
-def test_equals_one_solve_over_the_whole_trajectory(reanchored_at: int | None) -> None:
-    """With a re-anchoring: readings after it say nothing of the position before it, but all the rest passes."""
-    system = make_linear(2, STEPS, reanchored_at)
+@pytest.mark.parametrize(("at", "forgotten"), [(None, (0, 1, 2)), (11, (0, 1, 2)), (11, (18, 22))])
+def test_equals_one_solve_over_the_whole_trajectory(at: int | None, forgotten: tuple[int, ...]) -> None:
+    """With a re-anchoring or new UWB paths: later readings say nothing of what was forgotten, but the rest passes."""
+    system = make_linear(2, STEPS, at, forgotten)
     expected, P_expected = dense_answer(system)
-    steps, work, settings, track = as_records(system)
-    smooth_back(steps, STEPS, work, settings[0], track)
+    steps, work, track = as_records(system)
+    smooth_back(steps, STEPS, work, track)
     mean, variance = states_of(track)
     np.testing.assert_allclose(mean[1:] / UNITS, expected[1:] / UNITS, atol=1e-9)
     np.testing.assert_allclose(
@@ -57,9 +58,9 @@ def test_position_information_does_not_cross_a_reanchoring() -> None:
         system.z[12:] += later
         # no time passes afterwards, so that no velocity can carry the news of a position
         system.dt[12:], system.Phi[12:, 0:3, 3:6], system.Phi[12:, 6:9, 9:12] = 1e-300, 0.0, 0.0
-        system.Phi[12:, 16, 16] = 1.0
-        steps, work, settings, track = as_records(system)
-        smooth_back(steps, STEPS, work, settings[0], track)
+        system.Phi[12:, range(E_UWB_BIAS, N), range(E_UWB_BIAS, N)] = 1.0
+        steps, work, track = as_records(system)
+        smooth_back(steps, STEPS, work, track)
         return states_of(track)[0]
 
     here, there = smoothed(0.0), smoothed(50.0)
@@ -70,16 +71,16 @@ def test_position_information_does_not_cross_a_reanchoring() -> None:
 def test_the_solver_is_the_inverse_of_badly_scaled_covariances() -> None:
     rng = np.random.default_rng(4)
     for _ in range(50):
-        P, X = random_covariance(rng), rng.normal(size=(18, 18))
-        Y, U, scale, inverse = X.copy(), np.zeros((18, 18)), np.empty(18), np.empty(18)
+        P, X = random_covariance(rng), rng.normal(size=(N, N))
+        Y, U, scale, inverse = X.copy(), np.zeros((N, N)), np.empty(N), np.empty(N)
         factorise(P, scale, inverse, U)
         solve(U, scale, inverse, Y)
         np.testing.assert_allclose(P @ Y, X, atol=1e-8 * np.abs(X).max())
 
 
 def test_a_quantity_known_exactly_is_left_alone() -> None:
-    P = np.diag(np.r_[1.0, 0.0, np.ones(16)])
-    X, U, scale, inverse = np.eye(18), np.zeros((18, 18)), np.empty(18), np.empty(18)
+    P = np.diag(np.r_[1.0, 0.0, np.ones(N - 2)])
+    X, U, scale, inverse = np.eye(N), np.zeros((N, N)), np.empty(N), np.empty(N)
     factorise(P, scale, inverse, U)
     solve(U, scale, inverse, X)
     np.testing.assert_array_equal(X, P)

@@ -36,7 +36,7 @@ def pushed(config: Config, stream: list[Reading]) -> CorridorEstimator:
 
 def bits(state: AxialState) -> tuple[bytes, ...]:
     numbers = (state.position_m, state.velocity_m_s, state.quaternion_WB, state.gyro_bias_rad_s, state.accel_bias_m_s2)
-    rest = np.array([state.blur_scale, state.uwb_bias_m, state.wall_offset_m, state.resets])
+    rest = np.array([state.blur_scale, *state.uwb_bias_m, state.wall_offset_m, state.resets])
     return tuple(a.tobytes() for a in (*numbers, rest, state.covariance))
 
 

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from axialnav.fusion.batch import run_batch
 from axialnav.models.rig import Surface
+from axialnav.models.state import E_WALL_OFFSET, WALL_OFFSET
 from tests.fusion.inside import memories
 from tests.fusion.made_flights import MadeFlight, Scene, fly, textbook
 
@@ -34,8 +35,8 @@ def test_the_offset_is_found_within_its_sigma_over_many_flights() -> None:
         slant = np.interp(table.t_ns, flight.tables["imu0"].t_ns, tilt)
         table.columns["range_m"][:] -= floor_m / slant
         ((_, memory),) = memories(flight.config, flight.tables)
-        error = memory.core["x"][0, 0, 18] - floor_m
-        variance = memory.core["P"][0, 0, 17, 17]
+        error = memory.core["x"][0, 0, WALL_OFFSET] - floor_m
+        variance = memory.core["P"][0, 0, E_WALL_OFFSET, E_WALL_OFFSET]
         assert variance < 0.1**2
         total += error**2 / variance
     assert chi2.ppf(0.005, flights) < total < chi2.ppf(0.995, flights)

@@ -24,7 +24,7 @@ def with_attitude(x: Array, attitude: Rotation) -> Array:
 
 
 def plus(x: Array, error: Array) -> Array:
-    """Nominal state (19,) plus an error state (18,): attitude right-multiplied (body axes), the rest added."""
+    """Nominal state (26,) plus an error state (25,): attitude right-multiplied (body axes), the rest added."""
     out = with_attitude(x, rotation_of(x) * Rotation.from_rotvec(error[6:9]))
     out[:6] += error[:6]
     out[10:] += error[9:]
@@ -32,7 +32,7 @@ def plus(x: Array, error: Array) -> Array:
 
 
 def minus(a: Array, b: Array) -> Array:
-    """Error state (18,) that takes nominal state ``b`` to ``a``."""
+    """Error state (25,) that takes nominal state ``b`` to ``a``."""
     error = np.empty(N_ERROR)
     error[:6] = a[:6] - b[:6]
     error[6:9] = (rotation_of(b).inv() * rotation_of(a)).as_rotvec()
@@ -49,13 +49,14 @@ def random_state(rng: np.random.Generator, tilt_rad: float = 0.4) -> Array:
     x = with_attitude(x, Rotation.from_euler("ZYX", [rng.uniform(-np.pi, np.pi), pitch, roll]))
     x[10:13] = rng.normal(0, 0.05, 3)
     x[13:16] = rng.normal(0, 0.3, 3)
-    x[16:19] = rng.normal(0, [0.05, 0.2, 0.1])
+    x[16:18] = rng.normal(0, [0.05, 0.1])
+    x[18:] = rng.normal(0, 0.2, N_NOMINAL - 18)
     assert x.shape == (N_NOMINAL,)
     return x
 
 
 def central_differences(function, x: Array, step: float = 1e-6) -> Array:
-    """Jacobian (m, 18) of ``function`` (nominal state to (m,)) with respect to the error state at ``x``."""
+    """Jacobian (m, 25) of ``function`` (nominal state to (m,)) with respect to the error state at ``x``."""
     columns = []
     for k in range(N_ERROR):
         error = np.zeros(N_ERROR)

@@ -67,9 +67,9 @@ MODELS = [
     Model("blur length", blur_length),
     *(Model(f"range, offset {'state' if o else 'known'}, {'lever' if lv.any() else 'centre'}", distance(lv, o))
       for lv in (ZERO, LEVER_B) for o in (False, True)),
-    *(Model(f"uwb range {i}", lambda x, R, H, i=i: uwb_range(x, x[:3], R, LEVER_B, ANCHORS[i], H)) for i in (0, 1)),
-    Model("uwb range difference", lambda x, R, H: uwb_tdoa(x, x[:3], R, LEVER_B, ANCHORS[0], ANCHORS[1], H)),
-    *(Model(f"uwb position {'xyz'[i]}", lambda x, R, H, i=i: uwb_position(x, x[:3], R, LEVER_B, 0.6, i, H))
+    *(Model(f"uwb range {i}", lambda x, R, H, i=i: uwb_range(x, x[:3], R, LEVER_B, ANCHORS[i], 3 + i, H)) for i in (0, 1)),
+    Model("uwb range difference", lambda x, R, H: uwb_tdoa(x, x[:3], R, LEVER_B, ANCHORS[0], ANCHORS[1], 6, 5, H)),
+    *(Model(f"uwb position {'xyz'[i]}", lambda x, R, H, i=i: uwb_position(x, x[:3], R, LEVER_B, i, i, H))
       for i in (0, 1, 2)),
     Model("height", lambda x, R, H: height(x[:3], 12.0, H)),
     *(Model(f"tilt {name}", lambda x, R, H, i=i: tilt(R, i, H)) for i, name in enumerate(("roll", "pitch"))),
@@ -94,11 +94,11 @@ def test_jacobian_is_the_derivative_of_the_prediction(model: Model) -> None:
 
 
 def test_every_error_state_but_the_accelerometer_bias_is_seen_by_some_measurement() -> None:
-    """The bias of the accelerometer shows only through the velocity it makes."""
+    """The bias of the accelerometer shows only through the velocity it makes; path 7 speaks in none of them."""
     x = random_state(np.random.default_rng(12))
     seen = np.zeros(N_ERROR, bool)
     for model in MODELS:
         H = np.zeros(N_ERROR)
         model.predict(x, rotation_of(x).as_matrix(), H)
         seen |= H != 0.0
-    assert list(np.flatnonzero(~seen)) == [12, 13, 14]
+    assert list(np.flatnonzero(~seen)) == [12, 13, 14, 24]

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from axialnav.models.aiding import height, tilt
 from axialnav.models.pixel_motion import pixel_motion
 from axialnav.models.rotations import quaternion_from_euler, rotation_matrix
-from axialnav.models.state import N_ERROR, zero_state
+from axialnav.models.state import N_ERROR, UWB_BIAS, zero_state
 from axialnav.models.uwb import MIN_RANGE_M, uwb_position, uwb_range, uwb_tdoa
 from tests.models.states import random_state, rotation_of
 
@@ -96,24 +96,26 @@ def test_uwb_reads_the_antenna_not_the_centre() -> None:
     """Nose to the left, antenna 0.5 m ahead of the centre: it is at y = 0.5."""
     x, R, H = zero_state(), Rotation.from_euler("z", np.pi / 2).as_matrix(), np.zeros(N_ERROR)
     ahead, anchor = np.array([0.5, 0.0, 0.0]), np.array([0.0, 4.0, 0.0])
-    assert uwb_range(x, NONE, R, ahead, anchor, H) == pytest.approx(3.5)
-    assert uwb_tdoa(x, NONE, R, ahead, anchor, -anchor, H) == pytest.approx(4.5 - 3.5)
-    assert uwb_position(x, NONE, R, ahead, 1.0, 1, H) == pytest.approx(0.5)
+    assert uwb_range(x, NONE, R, ahead, anchor, -1, H) == pytest.approx(3.5)
+    assert uwb_tdoa(x, NONE, R, ahead, anchor, -anchor, -1, -1, H) == pytest.approx(4.5 - 3.5)
+    assert uwb_position(x, NONE, R, ahead, 1, -1, H) == pytest.approx(0.5)
 
 
-def test_the_uwb_bias_lengthens_ranges_and_shifts_fixes_along_the_axis_only() -> None:
+def test_the_bias_of_a_uwb_path_lengthens_what_is_measured_over_it() -> None:
+    """Path 2 is 0.4 m too long, path 5 by 0.1 m; -1 has no bias."""
     x, H = zero_state(), np.zeros(N_ERROR)
-    x[17] = 0.4
+    x[UWB_BIAS + 2], x[UWB_BIAS + 5] = 0.4, 0.1
     anchor = np.array([3.0, 0.0, 0.0])
-    assert uwb_range(x, NONE, np.eye(3), NONE, anchor, H) == pytest.approx(3.4)
-    assert uwb_tdoa(x, NONE, np.eye(3), NONE, anchor, 2 * anchor, H) == pytest.approx(3.4)
-    assert [uwb_position(x, NONE, np.eye(3), NONE, a, i, H) for i, a in enumerate((1.0, 0.0, 0.0))] == [0.4, 0.0, 0.0]
+    assert [uwb_range(x, NONE, np.eye(3), NONE, anchor, path, H) for path in (2, 5, -1)] == pytest.approx([3.4, 3.1, 3])
+    for a, b, expected in ((2, 5, 3.0 + 0.1 - 0.4), (5, 2, 3.0 + 0.4 - 0.1), (-1, 2, 3.4)):
+        assert uwb_tdoa(x, NONE, np.eye(3), NONE, anchor, 2 * anchor, a, b, H) == pytest.approx(expected)
+    assert [uwb_position(x, NONE, np.eye(3), NONE, 1, path, H) for path in (2, 5, -1)] == [0.4, 0.1, 0.0]
 
 
 def test_at_the_anchor_itself_the_range_has_no_direction() -> None:
     near = np.array([0.5 * MIN_RANGE_M, 0.0, 0.0])
-    assert np.isnan(uwb_range(zero_state(), NONE, np.eye(3), NONE, near, np.zeros(N_ERROR)))
-    assert np.isnan(uwb_tdoa(zero_state(), NONE, np.eye(3), NONE, near, 99 * near, np.zeros(N_ERROR)))
+    assert np.isnan(uwb_range(zero_state(), NONE, np.eye(3), NONE, near, -1, np.zeros(N_ERROR)))
+    assert np.isnan(uwb_tdoa(zero_state(), NONE, np.eye(3), NONE, near, 99 * near, -1, -1, np.zeros(N_ERROR)))
 
 
 def test_height_is_above_its_datum() -> None:

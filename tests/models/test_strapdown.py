@@ -23,7 +23,7 @@ def step(x, gyro, accel, dt):
 
 
 def transition(F, dt):
-    """Dense Phi (18, 18) that the blocks stand for; the UWB bias is not the strapdown's."""
+    """Dense Phi (25, 25) that the blocks stand for; the UWB biases are not the strapdown's."""
     Phi = np.eye(N_ERROR)
     Phi[0:3, 3:6] = np.eye(3) * dt
     Phi[3:6, 6:9] = F[0:3]
@@ -113,7 +113,7 @@ def test_transition_blocks_are_the_derivative_of_the_step() -> None:
         difference = central_differences(after, x, 1e-5) - transition(F, dt)
         size = np.linalg.norm(accel) + np.linalg.norm(gyro)
         assert np.abs(difference[:3]).max() < size * dt**2
-        assert np.abs(difference[3:6, [*range(6), *range(12, 18)]]).max() < 1e-8
+        assert np.abs(difference[3:6, [*range(6), *range(12, N_ERROR)]]).max() < 1e-8
         assert np.abs(difference[3:6, 6:12]).max() < size**2 * dt**2
         assert np.abs(difference[6:9]).max() < size * dt**2
         assert np.abs(difference[9:]).max() < 1e-9
