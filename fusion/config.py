@@ -124,7 +124,7 @@ class ImuFault(_Table, frozen=True, kw_only=True):
 class UwbTuning(_Table, frozen=True, kw_only=True):
     """Noise of UWB readings.
 
-    A reading errs by white noise of ``sigma_m`` and by the bias of its path: per anchor, of ``bias_sigma_m``, alike over
+    A reading errs by white noise of ``sigma_m`` and by the bias of its path (anchor), of ``bias_sigma_m``, alike over
     ``bias_time_s`` and over ``bias_length_m`` of way.  Fixes that a receiver computed itself have ``fix_sigma_m`` and
     ``fix_bias_sigma_m`` per axis: they are as good as its geometry, which we cannot see.
 

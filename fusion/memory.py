@@ -115,8 +115,9 @@ def new_scratch() -> Records:
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
     "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_time_s", "uwb_bias_length_m",
-    "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s", "evidence", "trials_to_clear",
-    "evidence_to_clear", "dead_reckoning_s", "invalid_s", "reanchor_aided_s", "reanchor_alone_s",
+    "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s",
+    "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
+    "reanchor_aided_s", "reanchor_alone_s",
 )  # fmt: skip
 SETTINGS: Final = np.dtype([(name, "f8") for name in SETTINGS_FIELDS])
 

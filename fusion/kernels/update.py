@@ -42,7 +42,8 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     """Try one reading on filter ``row``; leave its record in ``w.row`` (10,) and return its log-likelihood.
 
     The log-likelihood is bounded (the NIS counts at most as much as the gate) and that of UWB divided by the number of
-    readings that repeat each other: what bias states leave of their likeness must not decide over the accelerometer.  Axes of one reading are gated together and fused one after the other.
+    readings that repeat each other: what bias states leave of their likeness must not decide over the accelerometer.
+    Axes of one reading are gated together and fused one after the other.
     """
     x, P = m.x[row], m.P[row]
     since_imu = (t_ns - m.t_imu) * 1e-9

@@ -67,7 +67,8 @@ MODELS = [
     Model("blur length", blur_length),
     *(Model(f"range, offset {'state' if o else 'known'}, {'lever' if lv.any() else 'centre'}", distance(lv, o))
       for lv in (ZERO, LEVER_B) for o in (False, True)),
-    *(Model(f"uwb range {i}", lambda x, R, H, i=i: uwb_range(x, x[:3], R, LEVER_B, ANCHORS[i], 3 + i, H)) for i in (0, 1)),
+    *(Model(f"uwb range {i}", lambda x, R, H, i=i: uwb_range(x, x[:3], R, LEVER_B, ANCHORS[i], 3 + i, H))
+      for i in (0, 1)),
     Model("uwb range difference", lambda x, R, H: uwb_tdoa(x, x[:3], R, LEVER_B, ANCHORS[0], ANCHORS[1], 6, 5, H)),
     *(Model(f"uwb position {'xyz'[i]}", lambda x, R, H, i=i: uwb_position(x, x[:3], R, LEVER_B, i, i, H))
       for i in (0, 1, 2)),
