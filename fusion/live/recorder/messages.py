@@ -88,7 +88,7 @@ DEFINITIONS: dict[str, str] = {
     **{OWN + kind.__name__: _own_definition(kind) for kind in OWN_READINGS},
     EXPOSURE: "std_msgs/Header header\nfloat64 exposure_s" + _HEADER,
     STATUS: "std_msgs/Header header\nfloat64 axial_position_m\nfloat64 axial_velocity_m_s\n"
-    "float64 sigma_axial_position_m\nfloat64 sigma_axial_velocity_m_s\nfloat64 blur_scale\nfloat64 uwb_bias_m\n"
+    "float64 sigma_axial_position_m\nfloat64 sigma_axial_velocity_m_s\nfloat64 blur_scale\nfloat64[8] uwb_bias_m\n"
     "float64 wall_offset_m\nuint32 flags\nuint32 resets" + _HEADER,
     OUTCOME: "std_msgs/Header header\nstring sensor\nuint8 verdict\nuint8 reason\nfloat64 nis\nfloat64 gate\n"
     "float64 weight\nfloat64[3] innovation\nfloat64[3] variance" + _HEADER,
@@ -204,7 +204,7 @@ def _odometry(state: AxialState) -> list[Any]:
 def _status(state: AxialState) -> list[Any]:
     axial = (state.axial_position_m, state.axial_velocity_m_s)
     sigmas = (state.sigma_axial_position_m, state.sigma_axial_velocity_m_s)
-    other = (state.blur_scale, state.uwb_bias_m, state.wall_offset_m, int(state.flags), state.resets)
+    other = (state.blur_scale, *state.uwb_bias_m.tolist(), state.wall_offset_m, int(state.flags), state.resets)
     return [*_header(state.t_ns, "corridor"), *axial, *sigmas, *other]
 
 

@@ -53,7 +53,7 @@ def frame(t_ns: int, picture: Any = PICTURE) -> CameraFrame:
 
 
 def state(t_ns: int) -> AxialState:
-    covariance = np.diag(np.arange(1.0, 19.0))
+    covariance = np.diag(np.arange(1.0, 26.0))
     half = math.sqrt(0.5)
     return AxialState(
         t_ns=t_ns,
@@ -67,7 +67,7 @@ def state(t_ns: int) -> AxialState:
         gyro_bias_rad_s=np.zeros(3),
         accel_bias_m_s2=np.zeros(3),
         blur_scale=0.01,
-        uwb_bias_m=0.02,
+        uwb_bias_m=np.full(8, 0.02),
         wall_offset_m=0.0,
         covariance=covariance,
         flags=Health.UWB_SUSPECT,
