@@ -4,10 +4,10 @@ With bias-free rate :math:`\omega` and specific force :math:`a` over a step dt,
 
 .. math::
     q \leftarrow q \otimes \exp(\omega\,dt), \quad
-    v \leftarrow v + (\bar R a + g)\,dt, \quad
-    p \leftarrow p + v\,dt + \tfrac12 (\bar R a + g)\,dt^2
+    v \leftarrow v + (R_m a + g)\,dt, \quad
+    p \leftarrow p + v\,dt + \tfrac12 (R_m a + g)\,dt^2
 
-where :math:`\bar R` is the attitude at mid-step.  The error state follows
+where :math:`R_m` is the attitude at mid-step.  The error state follows
 :math:`\delta\dot v = -R[a]_\times\theta - R\,\delta b_a`, :math:`\dot\theta = -[\omega]_\times\theta - \delta b_g`.
 
 Source: Sola (2017), section 5.4.
