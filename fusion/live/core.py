@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.axial_estimator import AxialEstimator
-from axialnav.fusion.config import Config
+from axialnav.fusion.config import Config, Initial
 from axialnav.fusion.corridor import CorridorEstimator, NotStartedError, PastStateError
 from axialnav.fusion.errors import FlightError, ReadingError
 from axialnav.fusion.memory import the_imu
@@ -21,6 +23,7 @@ from axialnav.fusion.readings import ImuSample, Reading
 
 MAX_GAP_NS = 1_000_000_000  # without inertial samples for longer, nobody knows where the vehicle is
 MAX_SPEED_M_S = 100.0
+SIGMA_M, SIGMA_M_S, SIGMA_RAD = 0.5, 1.0, 0.2  # of a state that is taken over
 LONG_AGO_NS = -(2**62)
 LOCK_S = 0.05
 ESTIMATORS: dict[str, type[CorridorEstimator]] = {"corridor": CorridorEstimator, "axial": AxialEstimator}
@@ -92,11 +95,14 @@ class FilterCore:
         self._imu: ImuSample | None = None
         self._aid_ns = LONG_AGO_NS
         self._count = 0
+        self._last: AxialState | None = None
         self._sick = False
         self._estimator = self._new()
 
-    def _new(self) -> CorridorEstimator:
+    def _new(self, last: AxialState | None = None, gap_s: float = 0.0) -> CorridorEstimator:
         config = self._make_config()
+        if self._count:
+            config = resumed(config, last, gap_s)
         if self._tap is not None:
             self._tap.restarted(config)
         self._rotation_BS = the_imu(config).rotation_BS
@@ -112,7 +118,7 @@ class FilterCore:
                 self.refused[f"{reading.sensor}: not a reading of a configured sensor"] += 1
                 return None
             except FlightError as error:
-                self._restart(f"cannot start: {error}")
+                self._restart(f"cannot start: {error}", reading.t_ns)
                 return None
             if isinstance(reading, ImuSample):
                 if self._imu is None or reading.t_ns > self._imu.t_ns:
@@ -124,10 +130,10 @@ class FilterCore:
             self._tap.pushed(reading, outcome, arrival_ns)
         return outcome
 
-    def restart(self, reason: str) -> None:
+    def restart(self, reason: str, now_ns: int) -> None:
         """Start anew, for example because the autopilot did; from the thread that pushes."""
         with self._lock:
-            self._restart(reason)
+            self._restart(reason, now_ns)
 
     def snapshot(self, now_ns: int) -> Snapshot | None:
         """The estimate carried forward to ``now_ns``; None while there is none or the filter is stuck."""
@@ -140,6 +146,8 @@ class FilterCore:
             if not _is_sane(state):
                 self._sick = True  # the thread that pushes starts it anew
                 return None
+            if state.velocity_valid:
+                self._last = state
             rate = self._rotation_BS @ np.array(self._imu.gyro_rad_s) - state.gyro_bias_rad_s
             return Snapshot(state, rate, self._imu.t_ns, self._aid_ns, self._count)
         except (NotStartedError, PastStateError):
@@ -149,17 +157,40 @@ class FilterCore:
 
     def _watch(self, reading: Reading) -> None:
         if self._sick:
-            self._restart("the estimate ran away")
+            self._restart("the estimate ran away", reading.t_ns)
         newest = self._imu
         if isinstance(reading, ImuSample) and newest is not None and reading.t_ns - newest.t_ns > MAX_GAP_NS:
-            self._restart("no inertial samples for more than 1 s")
+            self._restart("no inertial samples for more than 1 s", reading.t_ns)
 
-    def _restart(self, reason: str) -> None:
-        self._sick = False
+    def _restart(self, reason: str, now_ns: int) -> None:
+        last = None if self._sick else self._last
+        gap_s = (now_ns - self._imu.t_ns) * 1e-9 if self._imu is not None else 0.0
+        self._sick, self._last = False, None
         self.restarts[reason] += 1
         self._count += 1
         self._imu, self._aid_ns = None, LONG_AGO_NS
-        self._estimator = self._new()
+        self._estimator = self._new(last, max(gap_s, 0.0))
+
+
+def resumed(config: Config, last: AxialState | None, gap_s: float) -> Config:
+    """The configuration of a filter that starts in the middle of a flight: near where the last one was, if it knew.
+
+    What ``[initial]`` says holds for the beginning of the flight only.  Sigmas grow with the time that nobody saw.
+    """
+    if last is None:
+        return msgspec.structs.replace(config, initial=None)
+    w, x, y, z = (float(c) for c in last.quaternion_WB)
+    px, py, pz = (float(c) for c in last.position_m)
+    vx, vy, vz = (float(c) for c in last.velocity_m_s)
+    initial = Initial(
+        position_m=(px, py, pz),
+        velocity_m_s=(vx, vy, vz),
+        yaw_rad=math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        sigma_position_m=SIGMA_M + gap_s * SIGMA_M_S,
+        sigma_velocity_m_s=SIGMA_M_S,
+        sigma_yaw_rad=SIGMA_RAD * (1.0 + gap_s),
+    )
+    return msgspec.structs.replace(config, initial=initial)
 
 
 def _is_sane(state: AxialState) -> bool:

@@ -251,7 +251,7 @@ class Node:
             if item is None:
                 continue
             if item.reading is None:
-                self.core.restart(item.restart)
+                self.core.restart(item.restart, item.arrival_ns)
                 continue
             began_ns = self._clock()
             self.latency["queue"].add((began_ns - item.arrival_ns) * 1e-9)

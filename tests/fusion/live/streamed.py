@@ -22,10 +22,11 @@ import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as mavlink
 from scipy.spatial.transform import Rotation
 
+from axialnav.fusion.batch import run_batch
 from axialnav.fusion.config import Config
 from axialnav.fusion.live.vehicle import Inputs, Mavlink, Nooploop, Output, Status, Vehicle
 from tests.fusion.live.contract import Contract, ContractArduPilot
-from tests.fusion.made_flights import FOCAL_PX, MadeFlight, Scene, fly, motion
+from tests.fusion.made_flights import FOCAL_PX, MadeFlight, Scene, Table, fly, motion
 
 FLIP = np.array([1.0, -1.0, -1.0])
 FLAGS_NAVIGATING = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
@@ -114,8 +115,11 @@ class StreamedVehicle:
         self.slaves.append(slave)
 
     def start(self) -> None:
-        """Begin: the flight's first instant is now."""
+        """Begin as soon as the node is heard: the flight's first instant is then."""
         self.events = self._events()
+        self.socket.settimeout(30.0)
+        _, self.peer = self.socket.recvfrom(4096)
+        self.socket.settimeout(0.02)
         self.t0_ns = time.monotonic_ns()
         self.threads = [threading.Thread(target=body, daemon=True) for body in (self._fly, self._listen)]
         for thread in self.threads:
@@ -312,3 +316,21 @@ def ahead(config: Config) -> Config:
 def with_output(vehicle: Vehicle, **changes: Any) -> Vehicle:
     """Copy of a vehicle with other output rules."""
     return msgspec.structs.replace(vehicle, output=msgspec.structs.replace(vehicle.output, **changes))
+
+
+def clean_axial_errors(flight: MadeFlight, scene: Scene, from_s: float, start_s: float, end_s: float) -> np.ndarray:
+    """Axial velocity of a replay that starts at ``from_s``, of all readings as they were made, minus the truth."""
+    first = int(flight.tables["imu0"].t_ns[0]) + round(from_s * 1e9)
+    tables = {}
+    for name, table in flight.tables.items():
+        keep = table.t_ns >= first
+        tables[name] = Table(table.t_ns[keep], {key: column[keep] for key, column in table.columns.items()})
+    track = run_batch(flight.config, tables).track
+    t = (track.t_ns - flight.tables["imu0"].t_ns[0]) * 1e-9
+    wanted = (t >= start_s) & (t < end_s)
+    truth = motion(scene, t[wanted]).velocity_m_s[:, 0]
+    return np.asarray(track.velocity_m_s[wanted, 0] - truth)
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

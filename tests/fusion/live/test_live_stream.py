@@ -1,0 +1,229 @@
+"""The whole node on loopback: a flight streamed in real time over a bad link, and every packet accounted for."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from axialnav.fusion.live.node import Node
+from axialnav.fusion.live.recording import FlightRecording
+from axialnav.fusion.live.warm_up import warm_up
+from axialnav.fusion.strict_toml import dump
+from tests.fusion.live.contract import ContractPx4
+from tests.fusion.live.streamed import (
+    Air,
+    StreamedVehicle,
+    ahead,
+    clean_axial_errors,
+    rms,
+    streamed_flight,
+    vehicle_of,
+)
+from tests.fusion.made_flights import Scene
+from tests.house import ROOT
+
+SCENE = Scene(seed=4, duration_s=10.0, still_s=3.0, sensors=("range0", "flow0", "uwb0"), uwb_rate_hz=50.0)
+BAD = Air(jitter_s=0.002, lost=0.05, reordered=0.05, damaged=0.10, seed=4)
+# what a busy machine does between the two ends is not ours: the stamps below show when messages were made
+LATE = {"ODOMETRY: within 20 ms", "ODOMETRY: late by its own clock"}
+SCATTER = 1.4  # one run of seven seconds scatters by +-20 %; the bench pools several and stays within 10 %
+
+
+def ask(port: int) -> dict[str, Any]:
+    with socket.create_connection(("127.0.0.1", port), timeout=5.0) as connection, connection.makefile("rb") as file:
+        status: dict[str, Any] = json.loads(file.read())
+    return status
+
+
+def wait_for(condition: Any, seconds: float) -> bool:
+    for _ in range(round(seconds / 0.05)):
+        if condition():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.slow
+def test_a_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounted(tmp_path: Path) -> None:
+    flight = streamed_flight(SCENE)
+    streamed = StreamedVehicle(flight, SCENE, BAD)
+    vehicle = vehicle_of(ahead(flight.config), streamed.port, streamed.ttys)
+    warm_up(vehicle.filter, vehicle.estimator)
+    recording = FlightRecording(tmp_path / "flights", True, time.monotonic_ns)
+    node = Node(vehicle, recording=recording)
+    node.start()
+    streamed.start()
+    try:
+        assert wait_for(lambda: streamed.now_s() > SCENE.duration_s + 0.3, 60.0)
+        status = node.status()
+    finally:
+        node.close()
+        streamed.close()
+    assert node.failure == ""
+    account_for_every_message(streamed, status)
+    account_for_every_serial_frame(streamed, status)
+    assert not set(streamed.contract.refused()) - LATE
+    assert streamed.contract.used("ODOMETRY") > 100
+    sent = np.diff([m.time_usec for _, m in streamed.contract.messages if m.get_type() == "ODOMETRY"])
+    assert sent.min() >= 20_000
+    clean = rms(clean_axial_errors(flight, SCENE, 0.5, 3.5, 9.8))
+    assert rms(streamed.axial_errors(3.5, 9.8)) < SCATTER * clean
+    recorded_is_what_was_pushed(next((tmp_path / "flights").glob("*.mcap")), status)
+
+
+def account_for_every_message(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
+    """What the vehicle sent is what was accepted plus what the gaps in the sequence say is missing."""
+    over_udp = Counter(streamed.sent)
+    for name in ("uwb0", "range0"):
+        del over_udp[name]
+    accepted, lost = status["link"]["counts"]["accepted"], status["link"]["lost"]["1/1"]
+    spoilt = sum(n for name, n in streamed.dropped.items() if not name.startswith(("uwb0", "range0")))
+    assert accepted + lost <= sum(over_udp.values()) <= accepted + lost + 3  # the last packets leave no gap
+    assert abs(lost - spoilt) <= 3
+    messages, pilot = status["autopilot"]["messages"], status["autopilot"]
+    assert sum(messages.values()) == accepted
+    sensors = sum(pilot["readings"].values()) + sum(pilot["refused"].values())
+    silent = sum(messages.get(m, 0) for m in ("TIMESYNC", "HEARTBEAT", "EKF_STATUS_REPORT", "ATTITUDE_QUATERNION"))
+    unknown = messages["ATTITUDE_QUATERNION"] - sum(n for r, n in pilot["refused"].items() if "ATTITUDE" in r)
+    assert unknown >= 0
+    assert sensors + silent - pilot["refused"].get("clock not known yet", 0) <= accepted <= sensors + silent
+    filter_ = status["filter"]
+    pushed = sum(n for sensor in filter_["verdicts"].values() for n in sensor.values())
+    delivered = sum(pilot["readings"].values()) + sum(line["readings"] for line in status["nooploop"].values())
+    assert pushed + filter_["dropped"] + filter_["waiting"] + sum(filter_["refused"].values()) == delivered
+
+
+def account_for_every_serial_frame(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
+    """Frames that arrived whole are decoded; every byte of the others is counted."""
+    for name, size in (("uwb0", 29), ("range0", 16)):
+        line = status["nooploop"][streamed.ttys[name]]
+        spoilt = streamed.dropped[name] + streamed.dropped[f"{name} damaged"]
+        decoded = sum(line["frames"].values())
+        assert decoded == streamed.sent[name] - spoilt
+        assert line["total_bytes"] == decoded * size + line["skipped_bytes"] + line["waiting_bytes"]
+
+
+def recorded_is_what_was_pushed(path: Path, status: dict[str, Any]) -> None:
+    with path.open("rb") as file:
+        statistics = make_reader(file).get_summary()
+    assert statistics is not None
+    assert statistics.statistics is not None
+    counts = statistics.statistics.channel_message_counts
+    topics = {channel.topic: counts[number] for number, channel in statistics.channels.items()}
+    for sensor, verdicts in status["filter"]["verdicts"].items():
+        assert topics[f"/{sensor}"] == sum(verdicts.values())
+    assert topics["/wire/mavlink_in"] > 1000
+    assert topics["/state"] > 100
+
+
+@pytest.mark.slow
+def test_px4_takes_the_axial_estimate() -> None:
+    """The axial estimator (attitude of the autopilot, no UWB) with the profile for PX4."""
+    scene = Scene(seed=6, duration_s=5.0, still_s=2.0, sensors=("range0", "flow0", "uwb0"), uwb_rate_hz=50.0)
+    flight = streamed_flight(scene)
+    config = ahead(flight.config).to_dict()
+    config["sensor"]["att0"] = {"kind": "attitude"}
+    config["axial"]["heading_rad"] = 0.0
+    del config["sensor"]["uwb0"]
+    streamed = StreamedVehicle(flight, scene, contract=ContractPx4())
+    ttys = {"range0": streamed.ttys["range0"]}
+    vehicle = vehicle_of(type(flight.config).from_dict(config), streamed.port, ttys, profile="px4")
+    inputs = msgspec.structs.replace(vehicle.input, attitude="att0")
+    vehicle = msgspec.structs.replace(vehicle, estimator="axial", input=inputs)
+    warm_up(vehicle.filter, vehicle.estimator)
+    node = Node(vehicle)
+    node.start()
+    streamed.start()
+    try:
+        assert wait_for(lambda: streamed.now_s() > scene.duration_s, 60.0)
+    finally:
+        node.close()
+        streamed.close()
+    sent = [m for _, m in streamed.contract.messages if m.get_type() == "ODOMETRY"]
+    assert vehicle.content == "axial"
+    assert streamed.contract.used("ODOMETRY") > 30, node.output.withheld
+    assert all(np.isnan(m.x) for m in sent)
+    assert all(sum(m.velocity_covariance[i] for i in (0, 6, 11)) >= 50.0 for m in sent)  # two axes of 25 each
+
+
+@pytest.mark.slow
+def test_the_verb_runs_with_the_core_alone_and_ends_cleanly_on_sigterm(tmp_path: Path) -> None:
+    """Every library of the extras is made unimportable; the process answers on its status port and stops when told."""
+    for library in ("cyclopts", "rich", "plotly", "jinja2", "pyarrow", "matplotlib"):
+        (tmp_path / f"{library}.py").write_text(f"raise ModuleNotFoundError('no {library}', name='{library}')\n")
+    flight = streamed_flight(SCENE)
+    streamed = StreamedVehicle(flight, SCENE)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    vehicle = vehicle_of(ahead(flight.config), streamed.port, streamed.ttys)
+    data = msgspec.to_builtins(vehicle)
+    data["status"] = {"port": port, "line_s": 0.5}
+    path = tmp_path / "vehicle.toml"
+    path.write_text(dump(without_none(data)), encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "axialnav", "live", "--config", str(path)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert "compiling" in process.stdout.readline()
+        assert "sending: full" in process.stdout.readline()
+        streamed.start()
+        assert wait_for(lambda: streamed.contract.used("ODOMETRY") > 20, 20.0)
+        status = ask(port)
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=20.0)
+    finally:
+        process.kill()
+        streamed.close()
+    assert process.returncode == 0, err
+    assert err == ""
+    assert out.endswith("stopped\n")
+    assert "set VISO_DELAY_MS to" in out
+    assert status["autopilot"]["using"] is True
+    assert status["state"]["sigma_axial_velocity_m_s"] > 0.0
+    assert status["latency"]["filter"]["count"] > 100
+
+
+def without_none(data: Any) -> Any:
+    """TOML has no null."""
+    if isinstance(data, dict):
+        return {key: without_none(value) for key, value in data.items() if value is not None}
+    return [without_none(v) for v in data] if isinstance(data, list) else data
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "text"),
+    [
+        (["live"], 2, "--config"),
+        (["live", "--config", "nowhere.toml"], 2, "nowhere.toml: cannot be read"),
+        (["camera", "--conf", "x"], 2, "--config"),
+        (["camera", "--config", "vehicle.toml"], 2, "the vehicle file has no [camera]"),
+    ],
+)
+def test_what_is_wrong_is_one_line(words: list[str], code: int, text: str, tmp_path: Path) -> None:
+    (tmp_path / "vehicle.toml").write_text('[filter.sensor.imu0]\nkind = "imu"\n')
+    command = [sys.executable, "-m", "axialnav", *words]
+    ended = subprocess.run(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == code
+    assert ended.stderr.count("\n") == 1
+    assert text in ended.stderr
