@@ -120,7 +120,7 @@ def test_frames_are_those_of_a_rotation_library(snapshots: list[Snapshot], headi
 def test_covariances_are_those_of_a_cloud_of_states(snapshots: list[Snapshot]) -> None:
     """20 000 states drawn around the estimate, each turned into the fields of the message."""
     state, rng, n = snapshots[-1].state, np.random.default_rng(1), 20_000
-    errors = rng.multivariate_normal(np.zeros(18), state.covariance, n)
+    errors = rng.multivariate_normal(np.zeros(len(state.covariance)), state.covariance, n)
     body = Rotation.from_quat(np.roll(state.quaternion_WB, -1)) * Rotation.from_rotvec(errors[:, 6:9])
     velocity = (body.inv().apply(state.velocity_m_s + errors[:, 3:6])) @ FLIP
     local = Rotation.from_euler("z", 0.7) * Rotation.from_matrix(FLIP)

@@ -194,7 +194,7 @@ def test_stamps_are_those_of_one_clock_and_in_order() -> None:
     for _ in range(50):
         bench.step()
     stamps = [m.time_usec for _, m in bench.sent]
-    assert stamps == [now // 1000 for now, _ in bench.sent]
+    assert stamps == [at // 1000 for at, _ in bench.sent]
     assert (np.diff(stamps) > 0).all()
 
 
@@ -204,13 +204,13 @@ def test_stamps_are_those_of_one_clock_and_in_order() -> None:
 def run_schedule(schedule: Schedule, frames_ns: list[int], until_ns: int) -> list[int]:
     """Instants of sending on a clock of 0.5 ms ticks."""
     sent, frames = [], list(frames_ns)
-    for now in range(0, until_ns, MS // 2):
-        while frames and frames[0] <= now:
+    for tick in range(0, until_ns, MS // 2):
+        while frames and frames[0] <= tick:
             schedule.frame_fused(frames.pop(0))
-        if schedule.wait_ns(now) == 0:
+        if schedule.wait_ns(tick) == 0:
             schedule.taken()
-            schedule.sent(now)
-            sent.append(now)
+            schedule.sent(tick)
+            sent.append(tick)
     return sent
 
 

@@ -92,7 +92,11 @@ def test_an_old_report_is_none() -> None:
 
 @pytest.mark.parametrize(
     ("profile", "trip_ms", "advice"),
-    [("ardupilot", 6.0, ("VISO_DELAY_MS", 6)), ("ardupilot", None, ("VISO_DELAY_MS", 2)), ("px4", 6.0, ("EKF2_EV_DELAY", 0))],
-)  # fmt: skip
+    [
+        ("ardupilot", 6.0, ("VISO_DELAY_MS", 6)),
+        ("ardupilot", None, ("VISO_DELAY_MS", 2)),
+        ("px4", 6.0, ("EKF2_EV_DELAY", 0)),
+    ],
+)
 def test_the_delay_to_set_is_the_way_to_the_autopilot(profile, trip_ms, advice) -> None:
     assert delay_advice(profile, None if trip_ms is None else round(trip_ms * 1e6)) == advice
