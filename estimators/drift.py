@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from axialnav.estimators.frames import Image
 from axialnav.estimators.positions import centred_times
 from axialnav.estimators.rows import SUMMED_COLUMNS, apply_window, bin_columns, fast_length, hann
-from axialnav.estimators.search import LagTransform, search_weight, unrelated_spread
+from axialnav.estimators.search import STEP_PX, LagTransform, search_weight, unrelated_spread
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
 
 Plane = NDArray[np.float32]
 COLUMNS = 40
 REACH_PX = 24.0
 MANY_FRAMES = 5
-STEP_PX = 0.25
+TALL_PX = 512  # taller pictures are read every second (third, ...) row: that is sharp enough
 MIN_SIGNIFICANCE = 6.0
 
 
@@ -43,6 +43,8 @@ class DriftMeter:
 
     def __init__(self, height: int, width: int, frames: int) -> None:
         self._count = min(COLUMNS, width // SUMMED_COLUMNS)
+        self._stride = max(1, height // TALL_PX)
+        height //= self._stride
         self.band = Band(fast_length(height))
         self._every = np.arange(self._count)
         self._window = hann(self.band.length)
@@ -53,7 +55,8 @@ class DriftMeter:
         self._pairs = np.zeros((2, frames, frames, 1, count), dtype=np.float32)
         self._edges = np.array([0, self._count], dtype=np.int64)
         self._lags = LagTransform(1, frames, self.band)
-        self._grid = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
+        reach = round(REACH_PX / STEP_PX)
+        self._grid = np.asarray(STEP_PX * np.arange(-reach, reach + 1), dtype=np.float64)
 
     def measure(self, images: list[Image], displacement_px: float) -> Drift:
         """Drift of frames (oldest first) whose wall moves by ``displacement_px`` per frame along the rows.
@@ -78,7 +81,7 @@ class DriftMeter:
         squares = np.zeros((1, self.band.count), dtype=np.float32)
         (all_re, all_im), (pair_re, pair_im) = self._spectra, self._pairs
         for k, image in enumerate(images):
-            bin_columns(image, int(offset[k]), step, self._columns)
+            bin_columns(image, int(offset[k]), step, self._stride, self._columns)
             apply_window(self._columns, self._every, 0, self._window, self._windowed)
             row_spectra(self._windowed, self.band, self._packed, all_re[k], all_im[k])
             add_power(all_re[k], all_im[k], self._edges, squares)
@@ -98,7 +101,7 @@ class DriftMeter:
         left, middle, right = gain[best - 1 : best + 2]
         bend = 2.0 * middle - left - right
         shift = 0.5 * (right - left) / bend if bend > 0.0 else 0.0
-        return Drift(float(self._grid[best] + STEP_PX * max(-0.5, min(0.5, shift))), True)
+        return Drift(self._stride * float(self._grid[best] + STEP_PX * max(-0.5, min(0.5, shift))), True)
 
 
 def cross_or_nan(drift: Drift) -> float:

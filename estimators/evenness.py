@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.extra import extra_step
+from axialnav.estimators.integrity import middle
 from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
 from axialnav.estimators.positions import free_positions, motion_basis
 from axialnav.estimators.spectrum import pair_frames
@@ -94,7 +95,9 @@ def stranger(fit: Fit, rows: Array) -> bool:
         return False
     pairs = pair_frames(frames)
     neighbours = fit.coherence.sum(axis=0)[pairs[:, 1] - pairs[:, 0] == 1]
-    usual, least = float(np.median(neighbours)), float(neighbours.min())
+    usual, least = middle(neighbours), float(neighbours.min())
+    if least >= MIN_PAIR_SHARE * usual:
+        return False
     total = fit.texture + fit.noise
     variance = float(np.sum(rows[:, None] * fit.weight**2 * (total**2 + fit.texture**2)) / 2.0)
-    return least < MIN_PAIR_SHARE * usual and usual - least > SURE_PAIR * np.sqrt(WINDOW_VARIANCE * variance)
+    return bool(usual - least > SURE_PAIR * np.sqrt(WINDOW_VARIANCE * variance))

@@ -102,7 +102,7 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
     for _ in range(passes):
         position = basis @ motion - products.offset_px
         texture, noise, coherent = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
-        weight = matched_weight(texture, noise, products.frames)
+        weight = matched_weight(texture, noise, products.frames) * products.independent
         if not climb(sums.re, sums.im, weight.astype(np.float32), omega, basis, products.offset_px, motion, LIMITS):
             return None
     score, information, coherence = evaluate(products, weight, basis @ motion - products.offset_px)

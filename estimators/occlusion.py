@@ -60,9 +60,16 @@ def _cell_powers(
         column[:] = np.float32(0.0)
         for r in range(edges[s], edges[s + 1]):
             total[:] = np.float32(0.0)
-            for k in range(order.shape[0]):
+            k = 0
+            while k < order.shape[0]:
                 low, high = max(0, -shift[k]), min(width, width - shift[k])
-                _add(planes[order[k], r, low + shift[k] : high + shift[k]], total[low:high])
+                line = planes[order[k], r, low + shift[k] : high + shift[k]]
+                if k + 1 < order.shape[0] and shift[k + 1] == shift[k]:
+                    _add_both(line, planes[order[k + 1], r, low + shift[k] : high + shift[k]], total[low:high])
+                    k += 1
+                else:
+                    _add(line, total[low:high])
+                k += 1
             _add_square(total, column)
         for b in range(out.shape[1]):
             power = np.float32(0.0)
@@ -75,6 +82,12 @@ def _cell_powers(
 def _add(line: Plane, total: Plane) -> None:
     for c in range(total.shape[0]):
         total[c] += line[c]
+
+
+@kernel
+def _add_both(line: Plane, other: Plane, total: Plane) -> None:
+    for c in range(total.shape[0]):
+        total[c] += line[c] + other[c]
 
 
 @kernel

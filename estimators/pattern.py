@@ -55,7 +55,7 @@ def without_pattern(products: Products, power: float) -> Products:
     """The products less a white pattern of this power per row and frame."""
     pairs, frequency = pair_frames(products.frames), products.band.frequency()
     shift = products.offset_px[pairs[:, 0]] - products.offset_px[pairs[:, 1]]
-    overlap = np.maximum(0.0, 1.0 - np.abs(shift) / products.band.length)
+    overlap = np.maximum(0.0, 1.0 - np.abs(shift) / products.window_px)
     pattern = power * overlap[:, None] * np.exp(2j * np.pi * frequency[None] * shift[:, None])
     rows = products.rows[:, :, None, None]
     return replace(

@@ -48,15 +48,27 @@ def _relative(cosine: Array, sine: Array, i: int, j: int, c: Array, d: Array) ->
 
 @kernel
 def _moments(re: Plane, im: Plane, c: Array, d: Array, omega: Array) -> tuple[float, float, float]:
-    """``sum Re E``, ``-sum w Im E`` and ``sum w^2 Re E`` of one pair."""
-    sum_re, slope, bend = 0.0, 0.0, 0.0
-    for f in range(omega.shape[0]):
+    """``sum Re E``, ``-sum w Im E`` and ``sum w^2 Re E`` of one pair.
+
+    Two halves at a time: the processor adds faster than one sum after the other allows.
+    """
+    half = omega.shape[0] // 2
+    sum_a, slope_a, bend_a, sum_b, slope_b, bend_b = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for f in range(half):
+        g = f + half
+        real_a, real_b = re[f] * c[f] - im[f] * d[f], re[g] * c[g] - im[g] * d[g]
+        sum_a += real_a
+        sum_b += real_b
+        slope_a -= omega[f] * (re[f] * d[f] + im[f] * c[f])
+        slope_b -= omega[g] * (re[g] * d[g] + im[g] * c[g])
+        bend_a += omega[f] * omega[f] * real_a
+        bend_b += omega[g] * omega[g] * real_b
+    for f in range(2 * half, omega.shape[0]):
         real = re[f] * c[f] - im[f] * d[f]
-        imaginary = omega[f] * (re[f] * d[f] + im[f] * c[f])
-        sum_re += real
-        slope -= imaginary
-        bend += omega[f] * omega[f] * real
-    return sum_re, slope, bend
+        sum_a += real
+        slope_a -= omega[f] * (re[f] * d[f] + im[f] * c[f])
+        bend_a += omega[f] * omega[f] * real
+    return sum_a + sum_b, slope_a + slope_b, bend_a + bend_b
 
 
 @kernel

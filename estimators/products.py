@@ -31,6 +31,8 @@ class Products:
         Where each frame's window starts, relative to the others [px], shape (n,).
     band
         Frequencies in use.
+    window_px
+        Length of the windows; zeros fill up what ``band`` transforms.
     rows
         Number of rows behind every sum, shape (s, c).
     height
@@ -42,6 +44,7 @@ class Products:
     power: Plane
     offset_px: Array
     band: Band
+    window_px: int
     rows: Array
     height: Array
 
@@ -49,6 +52,11 @@ class Products:
     def frames(self) -> int:
         """Number of frames."""
         return len(self.offset_px)
+
+    @property
+    def independent(self) -> float:
+        """Independent frequencies among those in use [-]: zeros make neighbours alike."""
+        return self.window_px / self.band.length
 
     def selected(self, strips: NDArray[np.bool_]) -> Products:
         """The same with some strips only."""

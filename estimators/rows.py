@@ -53,15 +53,16 @@ def sum_rows(frame: NDArray[np.uint8], top: int, height: int, sums: NDArray[np.u
 
 
 @kernel
-def bin_columns(frame: NDArray[np.uint8], first_column: int, step: int, out: Plane) -> None:
+def bin_columns(frame: NDArray[np.uint8], first_column: int, step: int, stride: int, out: Plane) -> None:
     """Sum 8 columns, every ``step`` columns, into the rows of ``out`` (c, h), less their mean: a transposed frame.
 
-    The caller sees to it that ``first_column + (c - 1) step + 8`` columns exist.
+    Only every row number ``stride`` is read.  The caller sees to it that ``first_column + (c - 1) step + 8`` columns
+    and ``h stride`` rows exist.
     """
     count, height = out.shape
     mean = np.zeros(count)
     for r in range(height):
-        line = frame[r]
+        line = frame[r * stride]
         for c in range(count):
             at = line[first_column + c * step : first_column + c * step + SUMMED_COLUMNS]
             total = np.float32(
@@ -84,10 +85,12 @@ def apply_window(rows: Plane, which: Index, start: int, window: Plane, out: Plan
 
 @kernel
 def apply_strip_windows(rows: Plane, start: int, edges: Index, windows: Plane, out: Plane) -> None:
-    """Windows of their own for every strip of rows: ``windows`` (s, length), ``edges`` (s + 1,)."""
+    """Windows of their own for every strip of rows, then zeros: ``windows`` (s, length), ``edges`` (s + 1,)."""
+    length = windows.shape[1]
     for s in range(windows.shape[0]):
         for r in range(edges[s], edges[s + 1]):
-            _multiply(rows[r, start : start + windows.shape[1]], windows[s], out[r])
+            _multiply(rows[r, start : start + length], windows[s], out[r])
+            out[r, length:] = np.float32(0.0)
 
 
 @kernel
@@ -96,7 +99,7 @@ def _multiply(line: Plane, window: Plane, out: Plane) -> None:
         out[c] = line[c] * window[c]
 
 
-def tukey(length: int, share: float = 0.12) -> Plane:
+def tukey(length: int, share: float = 0.06) -> Plane:
     """Window (length,) with cosine flanks over ``share`` of it."""
     flank = int(share * (length - 1) / 2)
     window = np.ones(length, dtype=np.float32)
@@ -116,4 +119,12 @@ def fast_length(length: int) -> int:
     length -= length % 2
     while cv2.getOptimalDFTSize(length) != length:
         length -= 2
+    return length
+
+
+def padded_length(length: int) -> int:
+    """Shortest even length >= ``length`` with a fast Fourier transform."""
+    length += length % 2
+    while cv2.getOptimalDFTSize(length) != length:
+        length += 2
     return length

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.spectrum import Band
-from axialnav.estimators.texture import group_starts, matched_weight, shape_family, texture_power
+from axialnav.estimators.texture import matched_weight, sharp_family, texture_power
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
-STEP_PX = 0.25
-SAMPLES_PER_PX = 2
+STEP_PX, SAMPLES_PER_PX = 0.25, 2  # half a sample, which ``_gather`` relies on
 SOFTENING = 3.0  # windows and texture that is not Gaussian make the likelihood over-confident by about this factor
 NEAR_PX = 1.0
 RIVAL_PX = 8.0
@@ -106,7 +105,7 @@ class LagTransform:
         weight
             Matched weights, shape (c, f).
         grid_px
-            Displacements [px], evenly spaced, shape (d,).
+            Displacements [px], neighbouring multiples of ``STEP_PX``, shape (d,).
         spread
             See :class:`Profiles`.
         """
@@ -116,8 +115,7 @@ class LagTransform:
         _pack(sums, self.band.first, packed)
         cv2.dft(packed, correlation, flags=cv2.DFT_ROWS | cv2.DFT_INVERSE | cv2.DFT_REAL_OUTPUT)
         gain = np.zeros((self.bands, len(grid_px)))
-        step = float(grid_px[1] - grid_px[0])
-        _gather(correlation.reshape(self.bands, -1, packed.shape[1]), float(grid_px[0]), step, gain)
+        _gather(correlation.reshape(self.bands, -1, packed.shape[1]), round(grid_px[0] / STEP_PX), gain)
         return Profiles(grid_px, gain, spread)
 
 
@@ -153,20 +151,24 @@ def _pack(sums: Plane, first: int, packed: Plane) -> None:
 
 
 @kernel
-def _gather(correlation: Plane, first_px: float, step_px: float, gain: Array) -> None:
-    """Read lag m of the circular correlations (b, m, l) at m times every displacement, between samples linearly."""
+def _gather(correlation: Plane, first: int, gain: Array) -> None:
+    """Read lag m of the circular correlations (b, m, l) at m times every displacement.
+
+    Displacements are multiples of a quarter pixel from number ``first`` on, samples half a pixel apart: what is read
+    lies on a sample or in the middle between two.
+    """
     bands, lags, length = correlation.shape
+    half = np.float32(0.5)
     for b in range(bands):
         for m in range(lags):
             line = correlation[b, m]
-            factor = (m + 1) * SAMPLES_PER_PX
             for d in range(gain.shape[1]):
-                place = (first_px + d * step_px) * factor
-                left = int(np.floor(place))
-                share = place - left
-                left = left % length if left < 0 or left >= length else left
-                right = left + 1 if left + 1 < length else 0
-                gain[b, d] += line[left] * (1.0 - share) + line[right] * share
+                place = (first + d) * (m + 1)
+                left = place >> 1
+                if left < 0 or left >= length:
+                    left %= length
+                right = left + (place & 1)
+                gain[b, d] += (line[left] + line[right if right < length else 0]) * half
 
 
 def unrelated_spread(power: Plane, weight: Array, frames: int, rows: Array) -> Array:
@@ -193,7 +195,8 @@ def search_weight(power: Array, looks: Array, band: Band, frames: int) -> Array:
     """Matched weights from the mean power (c, f) of ``looks`` (c,) rows; white noise, read off the finest class."""
     tail = int(NOISE_SHARE * band.count)
     noise = np.full(band.count, float(power[-1, tail:].mean()) + TINY)
-    shapes, texture = shape_family(band.first, band.count, band.length), np.empty_like(power)
+    shapes, family, starts = sharp_family(band.first, band.count, band.length)
+    texture = np.empty_like(power)
     for c in range(len(power)):
-        texture_power(power[c], noise, float(looks[c]), shapes, group_starts(band.count), texture[c])
+        texture_power(power[c], noise, float(looks[c]), shapes, family, starts, texture[c])
     return matched_weight(texture, noise, frames)

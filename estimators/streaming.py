@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import Image, check_times, luma, unusable
+from axialnav.estimators.frames import Image, check_times, luma, same_picture, unusable
 from axialnav.estimators.lens import CentralView
 from axialnav.estimators.measure import JointOptions, measure_joint
 from axialnav.estimators.methods import LEAST_FRAMES, estimate_stack, known_method
@@ -146,7 +146,7 @@ class MotionEstimator:
                 self._window = FrameWindow(grey.shape[0], grey.shape[1], self._frames, grey.dtype)
             window = self._window
             self._check_size(grey, window.images[0])
-            repeated = window.order and np.array_equal(window.images[window.order[-1]], grey)
+            repeated = window.order and same_picture(window.images[window.order[-1]], grey)
             self._reasons.append(unusable(grey) or (MotionReason.DUPLICATED if repeated else ""))
             window.push(grey)
         else:

@@ -62,6 +62,15 @@ def shape_family(first: int, count: int, length: int) -> Array:
     return np.array(family)
 
 
+@lru_cache(maxsize=64)
+def sharp_family(first: int, count: int, length: int) -> tuple[Array, Array, Index]:
+    """Shapes without blur, their means in the groups, and the first bins of the groups."""
+    shapes, starts = shape_family(first, count, length), group_starts(count)
+    family = np.empty((len(shapes), len(starts)))
+    grouped_family(shapes, starts, family)
+    return shapes, family, starts
+
+
 def blur_power(length_px: float, frequency: Array) -> Array:
     """Power transfer of a uniform blur, ``sinc(f l)^2``, with a floor that keeps its zeros harmless."""
     return np.asarray(np.sinc(length_px * frequency) ** 2 + 1e-4)
@@ -88,7 +97,16 @@ def smooth_noise(incoherent: Array, floor: float, out: Array) -> None:
 
 
 @kernel
-def texture_power(power: Array, noise: Array, looks: float, shapes: Array, starts: Index, out: Array) -> None:
+def grouped_family(shapes: Array, starts: Index, out: Array) -> None:
+    """:func:`group_means` of every shape (m, f), shape (m, g)."""
+    for m in range(shapes.shape[0]):
+        group_means(shapes[m], starts, out[m])
+
+
+@kernel
+def texture_power(
+    power: Array, noise: Array, looks: float, shapes: Array, family: Array, starts: Index, out: Array
+) -> None:
     """Texture power (f,): the member of ``shapes`` (m, f) that explains ``power - noise`` best.
 
     Parameters
@@ -99,8 +117,8 @@ def texture_power(power: Array, noise: Array, looks: float, shapes: Array, start
         Noise power in it, shape (f,).
     looks
         Number of independent squares that ``power`` is a mean of.
-    shapes
-        Candidate shapes.
+    shapes, family
+        Candidate shapes, and their means in the groups, shape (m, g).
     starts
         First bin of every group of neighbouring bins.
     out
@@ -111,14 +129,12 @@ def texture_power(power: Array, noise: Array, looks: float, shapes: Array, start
     Whittle's likelihood; the amplitude of every candidate by iterated weighted least squares, never below its own
     standard deviation, so that a texture lost in the noise keeps a weight.
     """
-    groups, many = starts.shape[0], shapes.shape[0]
-    p, n, sizes, family = np.empty(groups), np.empty(groups), np.empty(groups), np.empty((many, groups))
+    groups = starts.shape[0]
+    p, n, sizes = np.empty(groups), np.empty(groups), np.empty(groups)
     group_means(power, starts, p)
     group_means(noise, starts, n)
     for g in range(groups):
         sizes[g] = (starts[g + 1] if g + 1 < groups else power.shape[0]) - starts[g]
-    for m in range(many):
-        group_means(shapes[m], starts, family[m])
     best, amplitude = _best_shape(p, n, family, sizes, looks)
     for f in range(power.shape[0]):
         out[f] = amplitude * shapes[best, f]
@@ -174,6 +190,8 @@ def smooth_spectra(
     """
     count = power.shape[1]
     coherent, other, share = np.empty(count), np.empty(count), np.empty(count)
+    family = np.empty((shapes.shape[0], starts.shape[0]))
+    grouped_family(shapes, starts, family)
     for c in range(power.shape[0]):
         mean = 0.0
         for f in range(count):
@@ -186,7 +204,7 @@ def smooth_spectra(
         for f in range(count):
             share[f] = noise[f] / frames
             out[2, c, f] = coherent[f] - share[f]
-        texture_power(coherent, share, rows[c], shapes, starts, out[0, c])
+        texture_power(coherent, share, rows[c], shapes, family, starts, out[0, c])
 
 
 def matched_weight(texture: Array, noise: Array, frames: int) -> Array:

@@ -13,7 +13,7 @@ from axialnav.estimators.frames import Image
 from axialnav.estimators.layout import BANDS, STRIPS, RowLayout, binned_coefficients, remove_level
 from axialnav.estimators.occlusion import LEAST_SHARE, OccluderFinder, wall_window
 from axialnav.estimators.products import Products
-from axialnav.estimators.rows import apply_strip_windows, bin_height, fast_length, row_sums, tukey
+from axialnav.estimators.rows import apply_strip_windows, bin_height, padded_length, row_sums, tukey
 from axialnav.estimators.spectrum import Band, add_power, all_pair_products, pair_count, row_spectra
 
 Plane = NDArray[np.float32]
@@ -44,7 +44,7 @@ class FrameWindow:
         self._sums = row_sums(width, self.bin_height, dtype)
         self._work = np.zeros((1 << self.layout.levels, width), dtype=np.float32)
         self._means = np.zeros((BANDS, width), dtype=np.float32)
-        self._buffers = _Buffers(rows, width, frames, STRIPS * self.layout.classes)
+        self._buffers = _Buffers(self.layout, width, frames)
         self._occluders = OccluderFinder(width, self.layout.strip_edges)
         self.coarse = CoarseSearch(self.layout, width, frames)
         self.drift = DriftMeter(height, width, frames)
@@ -86,7 +86,7 @@ class FrameWindow:
         if down.any():
             planes, order = self._moved_down(down), np.arange(len(order))
         hidden = self._occluders.hidden(planes, order, offset)
-        return self._buffers.products(planes, order, offset, self.layout, hidden)
+        return self._buffers.products(planes, order, offset, hidden)
 
     def _moved_down(self, down: Index) -> Plane:
         """Binned rows (n, r, w) of frames whose rows start ``down`` pixels further down."""
@@ -101,49 +101,42 @@ class FrameWindow:
 
 
 class _Buffers:
-    """Scratch as wide as a frame; narrower windows use a part of it."""
+    """Scratch for the transforms, as long as a frame is wide: windows are padded with zeros.
 
-    def __init__(self, rows: int, width: int, frames: int, groups: int) -> None:
-        self._pairs = np.zeros(groups * pair_count(frames) * width, dtype=np.float32)
-        self._total = np.zeros(groups * width, dtype=np.float32)
-        self._windowed = np.zeros(rows * width, dtype=np.float32)
-        self._packed = np.zeros(rows * width, dtype=np.float32)
-        self._spectra = np.zeros((2, frames * rows * width // 2), dtype=np.float32)
-        self._shape = (rows, width)
-        self._tukey: dict[int, Plane] = {}
+    One length for all displacements loses nothing of the overlap, and is fast.
+    """
 
-    def products(
-        self, planes: Plane, order: Index, offset: Index, layout: RowLayout, hidden: NDArray[np.bool_]
-    ) -> Products:
+    def __init__(self, layout: RowLayout, width: int, frames: int) -> None:
+        self._layout, self._width, self._band = layout, width, Band(padded_length(width))
+        groups, count = len(layout.edges) - 1, self._band.count
+        self._pairs = np.zeros(2 * groups * pair_count(frames) * count, dtype=np.float32)
+        self._total = np.zeros((groups, count), dtype=np.float32)
+        self._windowed, self._packed = np.zeros((2, layout.used, self._band.length), dtype=np.float32)
+        self._spectra = np.zeros((2, frames, layout.used, count), dtype=np.float32)
+
+    def products(self, planes: Plane, order: Index, offset: Index, hidden: NDArray[np.bool_]) -> Products:
         """Products of windows of ``planes[order]`` that start at ``offset`` and leave out ``hidden`` cells (s, b)."""
-        rows, width = self._shape
-        frames, travel = len(order), int(np.ptp(offset))
-        band = Band(fast_length(width - travel))
-        starts = offset - offset.min() + (width - travel - band.length) // 2
-        windows, share = wall_window(hidden, starts, self._window(band.length))
-        re, im = (flat[: frames * rows * band.count].reshape(frames, rows, -1) for flat in self._spectra)
-        groups, pairs = len(layout.edges) - 1, pair_count(frames)
-        total = self._total[: groups * band.count].reshape(groups, band.count)
-        total[:] = 0.0
-        windowed, packed = (flat[: rows * band.length].reshape(rows, -1) for flat in (self._windowed, self._packed))
+        layout, band, frames = self._layout, self._band, len(order)
+        starts = offset - offset.min()
+        length = self._width - int(starts.max())
+        windows, share = wall_window(hidden, starts, tukey(length))
+        re, im = self._spectra[0, :frames], self._spectra[1, :frames]
+        self._total[:] = 0.0
         for k, slot in enumerate(order.tolist()):
-            apply_strip_windows(planes[slot], int(starts[k]), layout.strip_edges, windows, windowed)
-            row_spectra(windowed, band, packed, re[k], im[k])
-            add_power(re[k], im[k], layout.edges, total)
+            apply_strip_windows(planes[slot], int(starts[k]), layout.strip_edges, windows, self._windowed)
+            row_spectra(self._windowed, band, self._packed, re[k], im[k])
+            add_power(re[k], im[k], layout.edges, self._total)
+        groups, pairs = len(layout.edges) - 1, pair_count(frames)
         out = self._pairs[: 2 * groups * pairs * band.count].reshape(2, groups, pairs, band.count)
         all_pair_products(re, im, layout.edges, out[0], out[1])
         shape = (STRIPS, layout.classes)
         return Products(
             out[0].reshape(*shape, pairs, -1),
             out[1].reshape(*shape, pairs, -1),
-            total.reshape(*shape, -1),
+            self._total.reshape(*shape, -1),
             offset.astype(np.float64),
             band,
+            length,
             np.asarray(layout.count * np.maximum(share, LEAST_SHARE)[:, None], dtype=np.float64),
             layout.height,
         )
-
-    def _window(self, length: int) -> Plane:
-        if length not in self._tukey:
-            self._tukey[length] = tukey(length)
-        return self._tukey[length]

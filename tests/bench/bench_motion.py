@@ -1,4 +1,4 @@
-"""Image motion on rendered walls: ``python -m tests.bench.bench_motion [trials]`` (``make bench-motion``).
+"""Image motion on rendered walls: ``python -m tests.bench.bench_motion [trials [part ...]]`` (``make bench-motion``).
 
 960x540, five frames, 0.5-45 px per frame log-uniform, both signs, te / T = 0.3; every trial renders another piece of
 wall.  The bound is the Cramer-Rao bound of the rendered texture and light (``motion_bound``).
@@ -18,12 +18,12 @@ from axialnav.estimators.estimate import MotionEstimator, estimate_motion
 from axialnav.models.rig import Camera
 from axialnav.replay.simulate.render import Rendering
 from tests.bench.markdown import machine, number, table
+from tests.bench.motion_integrity import integrity
 from tests.bench.motion_peers import PEERS
 from tests.bench.motion_scenes import (
     BASE,
     CLEAN,
     DISTURBED,
-    EVERYTHING,
     EXPOSURE_S,
     FAINT,
     OCCLUDED,
@@ -41,18 +41,19 @@ PEER_TRIALS = 12
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print every table; the argument is the number of trials per row."""
+    """Print the tables; the arguments are the number of trials per row and the names of the parts, all by default."""
     cv2.setNumThreads(1)
     count = int(arguments[0]) if arguments else TRIALS
     print(f"{machine()}, {count} trials per row\n")
-    for part in (
-        accuracy(count),
-        integrity(max(1, count // 2)),
-        blur_methods(max(1, count // 4)),
-        peers(PEER_TRIALS),
-        speed(),
-    ):
-        print(part + "\n", flush=True)
+    parts: dict[str, Callable[[], str]] = {
+        "accuracy": lambda: accuracy(count),
+        "integrity": lambda: integrity(max(1, count // 2)),
+        "blur": lambda: blur_methods(max(1, count // 4)),
+        "peers": lambda: peers(PEER_TRIALS),
+        "speed": speed,
+    }
+    for name in arguments[1:] or parts:
+        print(parts[name]() + "\n", flush=True)
     return 0
 
 
@@ -79,22 +80,6 @@ def _row(trials: Trials, asked: float) -> tuple[str, ...]:
         f"{100.0 * trials.covered:.0f} %",
         str(trials.gross),
     )
-
-
-def integrity(count: int) -> str:
-    """How often something wrong is accepted, over everything that can go wrong."""
-    rows, asked, accepted, gross = [], 0, 0, 0
-    for condition in EVERYTHING:
-        trials = run_trials(condition, count, first=10_000)
-        asked, accepted, gross = asked + trials.asked, accepted + len(trials.error), gross + trials.gross
-        why = "; ".join(
-            f"{n} x {reason.split(':')[0]}" for reason, n in trials.reasons.most_common(3) if reason != "accepted"
-        )
-        five = str(trials.over_five_percent) if "dropped" in condition.name else "-"
-        rows.append((condition.name, f"{len(trials.error)}/{trials.asked}", str(trials.gross), five, why))
-    rows.append(("all", f"{accepted}/{asked}", str(gross), "-", ""))
-    head = ("condition", "accepted", "wrong by > max(1 px, 20 %)", "wrong by > 5 %", "refused because")
-    return table(head, rows)
 
 
 def blur_methods(count: int) -> str:
@@ -149,15 +134,14 @@ def _joint(frames: NDArray[np.uint8]) -> float:
 
 
 def speed() -> str:
-    """Processor time of streaming at 1080p, median of a run of frames."""
+    """Processor time of streaming at 1080p: median and least of a run of frames."""
     rows = []
-    for frames, asked in ((2, 1.0), (5, 4.0)):
+    for frames, asked in ((2, "1"), (5, "4, streaming 2")):
         for prior in (False, True):
             spent = list(_streaming(frames, prior))
-            rows.append(
-                (f"N = {frames}" + (", with prior" if prior else ""), number(float(np.median(spent)), 2), f"{asked:g}")
-            )
-    return table(("1080p, per new frame", "time [ms]", "asked"), rows)
+            name = f"N = {frames}" + (", with prior" if prior else "")
+            rows.append((name, number(float(np.median(spent)), 2), number(min(spent), 2), asked))
+    return table(("1080p, per new frame", "median [ms]", "least [ms]", "asked"), rows)
 
 
 def _streaming(frames: int, prior: bool) -> Iterator[float]:
