@@ -20,6 +20,7 @@ from cyclopts.exceptions import CycloptsError
 from axialnav.fusion.complaints import INTERRUPTED, PASSED, USAGE, complain, explain, shows_tracebacks
 from axialnav.fusion.live import cli as on_board
 from axialnav.replay.cli_check import check, compare
+from axialnav.replay.cli_convert import convert
 from axialnav.replay.cli_doctor import doctor
 from axialnav.replay.cli_output import emit
 from axialnav.replay.cli_replay import demo, replay
@@ -34,6 +35,7 @@ VERBS: dict[str, Callable[..., int]] = {
     "motion": motion_command,
     "check": check,
     "compare": compare,
+    "convert": convert,
 }
 HELP = """Axial velocity of a UAV in a featureless tunnel, with an honest uncertainty.
 

@@ -6,7 +6,7 @@ that a vehicle would push in flight.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -146,6 +146,9 @@ class Flight:
         (start_s, end_s) of the scoring window after the first IMU sample; None = from the beginning / to the end.
     drops
         Everything that was left out or kept with a reservation, counted and named.
+    frames
+        Camera -> function that goes through its pictures in the order of its table, for pictures that stand inside the
+        recording; other cameras have them below ``path``.
     """
 
     name: str
@@ -157,6 +160,7 @@ class Flight:
     gps: GpsReference | None = None
     evaluation: tuple[float | None, float | None] = (None, None)
     drops: tuple[Drop, ...] = ()
+    frames: Mapping[str, Callable[[], Iterator[NDArray[np.generic]]]] = field(default_factory=dict)
 
     def readings(self) -> Iterator[Reading]:
         """Typed readings of all fusable sensors in time order; ties in the fixed order of the filter."""
@@ -177,8 +181,17 @@ class Flight:
         return self.path / "mav0" / sensor / "data" / filename
 
 
-def load_flight(path: str | Path) -> Flight:
-    """Read a flight folder (EuRoC/ASL layout); ``path`` is the flight or its ``mav0``.
+def load_flight(path: str | Path, *, mapping: str | Path | None = None) -> Flight:
+    """Read a recording of any known format, which is told by content and not by name.
+
+    Parameters
+    ----------
+    path
+        A flight folder (EuRoC/ASL layout) or its ``mav0``, an MCAP file, a ROS 1 or 2 bag, a MAVLink ``.tlog``, an
+        ArduPilot ``.bin``, a PX4 ``.ulg``, a raw dump of a Nooploop serial line, or a folder with a video and a CSV.
+    mapping
+        TOML file that says which of the log's topics and fields are which sensor and how they are mounted; None: the
+        file beside the log that has its name with ``.toml``, else the defaults of the format.
 
     Raises
     ------
@@ -186,6 +199,6 @@ def load_flight(path: str | Path) -> Flight:
         One line: what cannot be used, why, and the way out.  What can be left out is left out and listed in
         :attr:`Flight.drops` instead.
     """
-    from axialnav.replay.readers.flight_folder import read_flight_folder
+    from axialnav.replay.readers.any_log import read_log
 
-    return read_flight_folder(Path(path))
+    return read_log(Path(path), None if mapping is None else Path(mapping))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -27,9 +27,26 @@ from axialnav.replay.flight import ANCHOR_FIELDS, Flight, SensorTable, Stamps
 
 def merge_readings(flight: Flight) -> Iterator[Reading]:
     """All fusable readings of a flight in time order; ties in the order in which the filter takes them."""
+    return _merged(flight, fused_sensors(flight.config))
+
+
+def all_readings(flight: Flight, without: Container[str] = ()) -> Iterator[Reading]:
+    """Readings of every sensor of a flight, fused or not, in time order.
+
+    Parameters
+    ----------
+    without
+        Names of sensors to leave out.
+    """
+    first = fused_sensors(flight.config)
+    names = [*first, *(name for name in flight.config.sensor if name not in first)]
+    return _merged(flight, [name for name in names if name not in without])
+
+
+def _merged(flight: Flight, names: Iterable[str]) -> Iterator[Reading]:
     makers: list[Callable[[int], Reading]] = []
     stamps: list[Stamps] = []
-    for name in fused_sensors(flight.config):
+    for name in names:
         kind = reading_class(flight.config.sensor[name])
         if kind is not None and name in flight.tables:
             makers.append(_maker(kind, name, flight.tables[name]))

@@ -16,7 +16,7 @@ SOURCES = package_sources() + sources_of_tests()
 # Library -> paths that may import it; tests may import every one of them.
 ALLOWED: dict[str, tuple[str, ...]] = {
     "cv2": ("estimators/", "fusion/live/camera", "replay/simulate/"),
-    "pymavlink": ("fusion/live/", "replay/readers/"),
+    "pymavlink": ("fusion/live/", "replay/readers/", "replay/convert/"),
     "filterpy": ("fusion/axial.py",),
     "scipy.stats": (),
     "matplotlib": ("replay/experiments/",),

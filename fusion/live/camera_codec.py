@@ -1,4 +1,4 @@
-"""Camera frames to compressed pictures and back, without loss unless it is asked for."""
+"""Camera frames to compressed pictures, without loss unless it is asked for."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from axialnav.fusion.errors import FlightError
 from axialnav.fusion.readings import CameraFrame
 
 PictureFormat = Literal["png", "jpeg"]
@@ -45,17 +43,3 @@ class PictureEncoder:
         if not done:
             raise ValueError(f"a picture of {image.dtype} {image.shape} is no {self._form}")
         return self._form, data.tobytes()
-
-
-def decode_picture(data: bytes, where: str) -> NDArray[np.generic]:
-    """Picture from its compressed bytes, as it was before.
-
-    Raises
-    ------
-    FlightError
-        No picture.
-    """
-    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise FlightError(f"{where}: a picture of {len(data)} bytes cannot be decoded; leave the camera out")
-    return np.asarray(image)

@@ -62,6 +62,8 @@ class Rows:
             number, text = self._lines[row]
             return f"line {number}: {text}"
         number = int(self.numbers[row])
+        if not self.text:
+            return f"message {number} at t_ns={self.t_ns[row]}"
         return f"line {number}: {_LINE_END.split(self.text)[number - 1]}"
 
     def subset(self, rows: NDArray[Any]) -> Rows:

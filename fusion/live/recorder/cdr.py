@@ -91,7 +91,7 @@ class Codec:
             packer = self._structs[key] = struct.Struct(_format(self.fields, list(lengths)))
         return HEAD + packer.pack(*spread)
 
-    def decode(self, payloads: Sequence[bytes]) -> Decoded:
+    def decode(self, payloads: Sequence[bytes | memoryview]) -> Decoded:
         """Columns of all messages that can be read."""
         parts: list[tuple[NDArray[np.int64], dict[str, NDArray[Any]]]] = []
         refused = 0
@@ -144,7 +144,7 @@ def _format(fields: tuple[Field, ...], lengths: list[int]) -> str:
     return "".join(codes)
 
 
-def _by_length(payloads: Sequence[bytes]) -> list[NDArray[np.int64]]:
+def _by_length(payloads: Sequence[bytes | memoryview]) -> list[NDArray[np.int64]]:
     sizes = np.array([len(payload) for payload in payloads], dtype=np.int64)
     return [np.flatnonzero(sizes == size) for size in np.unique(sizes)]
 
@@ -152,7 +152,7 @@ def _by_length(payloads: Sequence[bytes]) -> list[NDArray[np.int64]]:
 class _Walker:
     """Goes through one message field by field and notes where everything stands."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes | memoryview) -> None:
         if data[1] not in (0, 1):
             raise ValueError("not plain CDR")
         self._data = data
@@ -211,7 +211,7 @@ class _Walker:
         self.layout.end += size
 
 
-def _walk(fields: tuple[Field, ...], data: bytes) -> _Layout:
+def _walk(fields: tuple[Field, ...], data: bytes | memoryview) -> _Layout:
     """Layout of one message."""
     walker = _Walker(data)
     walker.members(fields)

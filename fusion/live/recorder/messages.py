@@ -24,7 +24,8 @@ _VECTOR = _LINE + "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z"
 _POINT = _LINE + "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z"
 _QUATERNION = _LINE + "geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1"
 _TIME = _LINE + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec"
-_HEADER = _LINE + "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id" + _TIME
+_HEADER_BODY = "builtin_interfaces/Time stamp\nstring frame_id"
+_HEADER = f"{_LINE}std_msgs/Header\n{_HEADER_BODY}{_TIME}"
 _POSE = _LINE + "geometry_msgs/Pose\nPoint position\nQuaternion orientation" + _POINT + _QUATERNION
 _POSE_COVARIANCE = _LINE + "geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance" + _POSE
 _TWIST = _LINE + "geometry_msgs/Twist\nVector3 linear\nVector3 angular" + _VECTOR
@@ -115,11 +116,13 @@ class MessageEncoder:
     ----------
     picture
         Turns a camera frame into (format, bytes).
+    ros1
+        Give headers the sequence number that ROS 1 expects in them.
     """
 
-    def __init__(self, picture: Encoder) -> None:
+    def __init__(self, picture: Encoder, *, ros1: bool = False) -> None:
         self._picture = picture
-        self._codecs = {name: Codec(name, text) for name, text in DEFINITIONS.items()}
+        self._codecs = {name: HeaderCodec(name, text, ros1=ros1) for name, text in DEFINITIONS.items()}
         self._own = {kind: (OWN + kind.__name__, value_fields(kind)) for kind in OWN_READINGS}
 
     def encode(self, channel: str, t_ns: int, message: Message) -> list[Encoded]:
@@ -155,6 +158,19 @@ class MessageEncoder:
             raise TypeError(
                 f"a {type(message).__name__} cannot be recorded; there are readings, states, bytes and text"
             )
+
+
+class HeaderCodec:
+    """Encoder of one message type; with ``ros1`` a sequence number of 0 comes first in its header."""
+
+    def __init__(self, name: str, definition: str, *, ros1: bool = False) -> None:
+        self._numbered = ros1 and definition.startswith("std_msgs/Header header")
+        text = definition.replace(_HEADER_BODY, f"uint32 seq\n{_HEADER_BODY}") if self._numbered else definition
+        self._codec = Codec(name, text)
+
+    def encode(self, values: list[Any]) -> bytes:
+        """Message from its values, header first."""
+        return self._codec.encode([0, *values] if self._numbered else values)
 
 
 def _header(t_ns: int, frame: str) -> list[Any]:

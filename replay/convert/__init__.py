@@ -1,0 +1,1 @@
+"""Any readable log to another format."""
