@@ -164,12 +164,12 @@ def test_one_clear_line(case: str, tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    assert "no such folder; give the folder that holds mav0/" in one_line(tmp_path / "nowhere")
+    assert "no such file or folder; give a flight folder" in one_line(tmp_path / "nowhere")
 
 
 def test_a_file_instead_of_a_folder(tmp_path: Path) -> None:
     path = standing_flight(tmp_path) / "mav0" / "imu0" / "data.csv"
-    assert "is a file, must be a flight folder" in one_line(path)
+    assert "is a text file, not a log; what is read: flight folder" in one_line(path)
 
 
 def test_one_folder_too_high_names_the_right_one(tmp_path: Path) -> None:
