@@ -26,6 +26,7 @@ def replay(
     estimator: str = "corridor",
     smooth: Annotated[bool, Parameter(negative=())] = False,
     param: Names = None,
+    mapping: Path | None = None,
 ) -> int:
     """Run the filter over a recorded flight, print the table and write the run folder.
 
@@ -35,7 +36,7 @@ def replay(
     Parameters
     ----------
     log
-        Flight folder.
+        Flight folder, or any other log that axialnav reads.
     config
         TOML file with settings; what it leaves open comes from the flight. The config.toml of a run folder repeats
         that run to the last bit.
@@ -49,6 +50,8 @@ def replay(
         Go back over the flight after filtering, so that every estimate knows the readings that came later.
     param
         One setting as NAME=VALUE, e.g. uwb.sigma_m=0.4; may be repeated.
+    mapping
+        TOML file that says which topics and fields of the log are which sensor.
     """
     from axialnav.fusion.config import Config
     from axialnav.replay.flight import load_flight
@@ -56,7 +59,7 @@ def replay(
 
     params = dict(map(_parameter, param or ()))
     settings = Config.from_toml(config) if config else None
-    flight = load_flight(log)
+    flight = load_flight(log, mapping=mapping)
     folder = out or Path("runs") / _file_name(flight.name)
     _refuse_flight_folder(folder)
     with progress_bar(f"replay {flight.name}") as progress:
