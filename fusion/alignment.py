@@ -12,7 +12,7 @@ from axialnav.fusion.config import Config, Initial
 from axialnav.fusion.errors import FlightError
 from axialnav.fusion.events import Events
 from axialnav.fusion.memory import Memory, the_imu
-from axialnav.fusion.sources import Kind, Records
+from axialnav.fusion.sources import Kind, Records, scale_sigma
 from axialnav.models.rotations import quaternion_from_euler, rotation_matrix
 from axialnav.models.state import (
     E_ACCEL_BIAS,
@@ -120,7 +120,7 @@ def _first_variances(config: Config, initial: Initial, level: Level) -> Array:
     sigma[E_ATT : E_ATT + 3] = tilt, tilt, initial.sigma_yaw_rad
     sigma[E_GYRO_BIAS : E_GYRO_BIAS + 3] = bias
     sigma[E_ACCEL_BIAS : E_ACCEL_BIAS + 3] = start.sigma_accel_bias_m_s2
-    sigma[E_BLUR_SCALE] = config.flow.scale_sigma
+    sigma[E_BLUR_SCALE] = scale_sigma(config)
     sigma[E_WALL_OFFSET] = config.range.offset_sigma_m
     sigma[E_UWB_BIAS:] = _free_place_sigma(config)
     variances: Array = sigma**2

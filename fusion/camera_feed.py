@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ReadingError
 from axialnav.fusion.readings import CameraFrame, PixelMotion
-from axialnav.models.rig import Camera
+from axialnav.models.rig import Camera, Imu
 
 if TYPE_CHECKING:
     from axialnav.estimators.streaming import MotionEstimator
+
+
+USUAL_IMU_HZ = 200.0
 
 
 class CameraFeed:
@@ -18,6 +22,7 @@ class CameraFeed:
 
     def __init__(self, config: Config) -> None:
         self._cameras: dict[str, MotionEstimator] = {}
+        self._config = config
         self._periods = config.camera.frames - 1
         for name, spec in config.sensor.items():
             if isinstance(spec, Camera) and spec.surface is not None:
@@ -44,13 +49,28 @@ class CameraFeed:
         estimate = self._cameras[frame.sensor].push(frame.t_ns, frame.image, frame.exposure_s)
         if estimate is None or not estimate.accepted or estimate.t_ns is None:
             return None
+        period_s = estimate.window_s / self._periods
         return PixelMotion(
             t_ns=estimate.t_ns,
             sensor=frame.sensor,
-            window_s=estimate.window_s / self._periods,
+            window_s=period_s,
             dx_px=estimate.displacement_px,
-            sigma_px=estimate.sigma_px,
+            sigma_px=math.hypot(estimate.sigma_px, rotation_sigma_px(self._config, frame.sensor, period_s)),
         )
+
+
+def rotation_sigma_px(config: Config, camera: str, period_s: float) -> float:
+    """What one gyro sample's noise makes of the image's rotation over a frame period [px].
+
+    The filter takes the rotation out of a window with the sample at its middle, so that the noise of that sample is
+    noise of the reading: ``f T`` times density times the root of the sampling rate.
+    """
+    imu = next((s for n, s in config.sensor.items() if isinstance(s, Imu) and n not in config.disabled), None)
+    spec = config.sensor[camera]
+    if imu is None or not isinstance(spec, Camera):
+        return 0.0
+    sample = imu.gyro_noise_density * config.imu.gyro_noise_scale * math.sqrt(imu.rate_hz or USUAL_IMU_HZ)
+    return spec.focal_px[0] * period_s * sample
 
 
 def _motion_estimator(camera: Camera, config: Config) -> MotionEstimator:

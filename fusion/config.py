@@ -157,10 +157,15 @@ class FlowTuning(_Table, frozen=True, kw_only=True):
 
 
 class CameraTuning(_Table, frozen=True, kw_only=True):
-    """How camera frames become pixel motion: ``frames`` neighbours at a time, by the named method."""
+    """How camera frames become pixel motion: ``frames`` neighbours at a time, by the named method.
+
+    ``scale_sigma`` is how well a calibrated camera's focal length and clock are known; it replaces
+    ``flow.scale_sigma`` where cameras are all that sees motion.
+    """
 
     frames: Annotated[int, msgspec.Meta(ge=2, le=32)] = 5
     method: str = "joint"
+    scale_sigma: Positive = 0.003
 
 
 class RangeTuning(_Table, frozen=True, kw_only=True):

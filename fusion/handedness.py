@@ -66,7 +66,10 @@ def mirror_config(config: Config) -> Config:
 
 
 def _mirror_surface(surface: Surface) -> Surface:
-    return msgspec.structs.replace(surface, normal=_flip(surface.normal))
+    faces = tuple(
+        msgspec.structs.replace(f, normal=_flip(f.normal), start=_flip(f.start), end=_flip(f.end)) for f in surface.face
+    )
+    return msgspec.structs.replace(surface, normal=_flip(surface.normal), face=faces)
 
 
 def mirror_tables(tables: Mapping[str, Table]) -> dict[str, Table]:

@@ -69,7 +69,7 @@ SCRATCH: Final = np.dtype(
         ("z", "f8", 3), ("h", "f8", 3), ("variance", "f8", 3), ("H", "f8", (3, N_ERROR)), ("S", "f8", (3, 3)),
         ("y", "f8", 3), ("PHt", "f8", N_ERROR), ("gain", "f8", N_ERROR), ("step", "f8", N_ERROR), ("R", "f8", (3, 3)),
         ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 8), ("p", "f8", 3), ("mean_imu", "f8", 6),
-        ("focal_window", "f8", 2), ("row", "f8", 10), ("repeated", "f8"),
+        ("focal_window", "f8", 2), ("row", "f8", 10), ("repeated", "f8"), ("normal", "f8", 3), ("plane", "f8", 2),
     ],
     align=True,
 )  # fmt: skip

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.config import Config, Gate
 from axialnav.fusion.errors import ConfigError
+from axialnav.models.faces import FACE_WIDTH
 from axialnav.models.rig import (
+    MAX_FACES,
     AnySensor,
     AttitudeSource,
     Barometer,
@@ -58,6 +60,8 @@ SOURCE = np.dtype(
         ("normal_W", "f8", 3),
         ("offset_m", "f8"),
         ("offset_is_state", "?"),
+        ("faces", "f8", (MAX_FACES, FACE_WIDTH)),
+        ("n_faces", "i8"),
         ("low", "f8"),
         ("high", "f8"),
         ("anchors", "f8", (MAX_ANCHORS, 3)),
@@ -107,12 +111,22 @@ def build_sources(config: Config) -> Records:
     sources["first_path"] = MAX_ANCHORS * np.arange(len(names))
     for source, name in zip(sources, names, strict=True):
         for field, value in _row(name, config.sensor[name], config).items():
-            if field == "anchors":
+            if field == "faces":
+                source["faces"][: len(value)] = np.array(value, dtype=np.float64).reshape(-1, FACE_WIDTH)
+                source["n_faces"] = len(value)
+            elif field == "anchors":
                 source["anchors"][: len(value)] = np.array(value, dtype=np.float64).reshape(-1, 3)
                 source["n_anchors"] = len(value)
             else:
                 source[field] = value
     return sources
+
+
+def scale_sigma(config: Config) -> float:
+    """How well the blur scale is known at the start [-]: as a calibrated camera's, or as a flow chip's."""
+    seeing = [s for n, s in config.sensor.items() if n not in config.disabled and kind_of(s) in (Kind.FLOW, Kind.BLUR)]
+    calibrated = bool(seeing) and all(isinstance(spec, Camera) for spec in seeing)
+    return config.camera.scale_sigma if calibrated else config.flow.scale_sigma
 
 
 def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
@@ -143,6 +157,7 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
             "normal_W": surface.normal,
             "offset_m": surface.offset_m if known else 0.0,
             "offset_is_state": not known,
+            "faces": [(*f.normal, f.offset_m, *f.start, *f.end, f.roughness_m) for f in surface.face],
         }
     if isinstance(spec, Flow | BlurMeter):
         row |= {"focal_px": spec.focal_px, "low": config.flow.min_quality}

@@ -20,6 +20,7 @@ NonNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 Transform = Annotated[tuple[float, ...], msgspec.Meta(min_length=16, max_length=16)]
 IDENTITY: Transform = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 ROTATION_TOLERANCE = 1e-3
+MAX_FACES = 64
 
 
 class Sensor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
@@ -134,18 +135,45 @@ class Gps(Sensor, frozen=True, kw_only=True, tag="gps"):
 AnySensor = Imu | Camera | BlurMeter | Flow | RangeFinder | Uwb | Barometer | AttitudeSource | Gps
 
 
+class Face(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One plane of a surface that has several: ``normal . p = offset_m`` between ``start`` and ``end``.
+
+    It reaches along the line between the two points and without limit across it.  ``roughness_m`` is how far the real
+    surface (steps, ribs) lies off the plane, as a standard deviation.
+    """
+
+    normal: Vector3
+    offset_m: float
+    start: Vector3
+    end: Vector3
+    roughness_m: NonNegative = 0.0
+
+    def __post_init__(self) -> None:
+        _require_unit(self.normal)
+        if not math.dist(self.start, self.end) > 1e-6:
+            raise ValueError(f"a face must reach from start to another point end, got {self.start} for both")
+
+
 class Surface(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Plane ``normal . p = offset_m``; the unit normal points from the surface into free space.
 
-    ``offset_m = "unknown"`` makes the filter estimate it (one such surface at a time).
+    ``offset_m = "unknown"`` makes the filter estimate it (one such surface at a time).  A surface with ``face`` entries
+    is made of those planes instead, and a sensor sees the one that its ray meets first.
     """
 
     normal: Vector3
     offset_m: float | Literal["unknown"] = 0.0
+    face: tuple[Face, ...] = ()
 
     def __post_init__(self) -> None:
-        length = math.sqrt(sum(c * c for c in self.normal))
-        if not abs(length - 1.0) < 1e-3:
-            raise ValueError(
-                f"surface normal must have length 1 (tolerance 0.001), got {length:.4g} from {self.normal}"
-            )
+        _require_unit(self.normal)
+        if self.face and self.offset_m == "unknown":
+            raise ValueError("a surface of several faces cannot have an unknown offset; give each face its own")
+        if len(self.face) > MAX_FACES:
+            raise ValueError(f"a surface may have {MAX_FACES} faces, got {len(self.face)}; name the nearest ones")
+
+
+def _require_unit(normal: Vector3) -> None:
+    length = math.sqrt(sum(c * c for c in normal))
+    if not abs(length - 1.0) < 1e-3:
+        raise ValueError(f"surface normal must have length 1 (tolerance 0.001), got {length:.4g} from {normal}")

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from axialnav.fusion.camera_feed import rotation_sigma_px
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import FlightError
 from axialnav.fusion.readings import CameraFrame
@@ -49,7 +50,12 @@ def motion_table(flight: Flight, camera: str, config: Config) -> SensorTable:
         columns={
             "window_s": window,
             "dx_px": np.array([e.displacement_px if e.accepted else np.nan for e in estimates]),
-            "sigma_px": np.array([e.sigma_px for e in estimates]),
+            "sigma_px": np.array(
+                [
+                    np.hypot(e.sigma_px, rotation_sigma_px(config, camera, period))
+                    for e, period in zip(estimates, window.tolist(), strict=True)
+                ]
+            ),
         },
     )
 

@@ -121,10 +121,25 @@ def _seen_from_camera(
 
 def _depth(flight: Flight, camera: Camera, R_WB: Array, position_W: Array) -> Array:
     surface = flight.config.surface[camera.surface or ""]
-    normal = np.array(surface.normal)
     eye = position_W + np.einsum("nij,j->ni", R_WB, camera.lever_arm_m)
     ray = np.einsum("nij,j->ni", R_WB, camera.rotation_BS[:, 2])
-    depth = (float(surface.offset_m) - eye @ normal) / (ray @ normal)
+    if not surface.face:
+        return _plane_depth(np.array(surface.normal), float(surface.offset_m), eye, ray)
+    depths = np.full((len(surface.face), len(eye)), np.inf)
+    for depth, face in zip(depths, surface.face, strict=True):
+        normal, start = np.array(face.normal), np.array(face.start)
+        along = np.array(face.end) - start
+        met = _plane_depth(normal, face.offset_m, eye, ray)
+        travelled = (eye + met[:, None] * ray - start) @ along
+        front = (ray @ normal < 0.0) & (travelled >= 0.0) & (travelled <= along @ along)
+        depth[front] = met[front]
+    nearest = np.min(np.where(np.isnan(depths), np.inf, depths), axis=0)
+    return np.where(np.isfinite(nearest), nearest, np.nan)
+
+
+def _plane_depth(normal: Array, offset_m: float, eye: Array, ray: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = (offset_m - eye @ normal) / (ray @ normal)
     return np.where(depth > 0.0, depth, np.nan)
 
 

@@ -69,6 +69,7 @@ TABLES = {
     "[[corridor.section]]": expected(tables.Section),
     "[initial]": expected(tables.Initial),
     "[surface.NAME]": expected(rig.Surface),
+    "[[surface.NAME.face]]": expected(rig.Face),
     "[sensor.NAME]": expected(rig.Sensor),
     **{f"[{name}]": expected(struct) for name, struct in SETTINGS.items()},
     **{f'kind = "{kind.__struct_config__.tag}"': expected(kind, COMMON) for kind in SENSORS},

@@ -11,6 +11,7 @@ from axialnav.fusion.kernels.paths import place_of
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
+from axialnav.models.faces import nearest_face
 from axialnav.models.jit import Integer, Record, kernel
 from axialnav.models.pixel_motion import pixel_motion
 from axialnav.models.state import E_VEL, N_ERROR, WALL_OFFSET
@@ -87,8 +88,22 @@ def variance_of(claimed_sigma: float, floor_sigma: float) -> float:
 
 
 @kernel
-def _surface_offset(s: Record, x: Array) -> float:
-    return float(x[WALL_OFFSET] if s.offset_is_state else s.offset_m)
+def _look_at_surface(s: Record, x: Array, w: Record) -> bool:
+    """Write the plane in view: its normal into ``w.normal``, offset and roughness [m] into ``w.plane``."""
+    if s.n_faces == 0:
+        for i in range(3):
+            w.normal[i] = s.normal_W[i]
+        w.plane[0] = x[WALL_OFFSET] if s.offset_is_state else s.offset_m
+        w.plane[1] = 0.0
+        return True
+    face = nearest_face(s.faces, s.n_faces, w.p, w.R, s.lever_B, s.R_BS[:, 2], w.ray)
+    if face < 0:
+        return False
+    for i in range(3):
+        w.normal[i] = s.faces[face, i]
+    w.plane[0] = s.faces[face, 3]
+    w.plane[1] = s.faces[face, 10]
+    return True
 
 
 @kernel
@@ -96,10 +111,10 @@ def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
     w.z[0] = values[0]
     if not s.low <= values[0] <= s.high:
         return -OUT_OF_RANGE
-    w.h[0] = wall_range(
-        w.p, w.R, s.R_BS, s.lever_B, s.normal_W, _surface_offset(s, x), s.offset_is_state, w.H[0], w.ray
-    )
-    w.variance[0] = variance_of(values[1], s.sigma)
+    if not _look_at_surface(s, x, w):
+        return -NO_GEOMETRY
+    w.h[0] = wall_range(w.p, w.R, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state, w.H[0], w.ray)
+    w.variance[0] = variance_of(values[1], s.sigma) + w.plane[1] ** 2
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
@@ -167,8 +182,10 @@ def _measure_fix(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m:
 def _pixel_motion(s: Record, window_s: float, axis: Integer, x: Array, m: Record, w: Record) -> float:
     for i in range(2):
         w.focal_window[i] = s.focal_px[i] * window_s
+    if not _look_at_surface(s, x, w):
+        return np.nan
     return pixel_motion(
-        x, w.p, w.R, m.imu[0:3], s.R_BS, s.lever_B, s.normal_W, _surface_offset(s, x), s.offset_is_state,
+        x, w.p, w.R, m.imu[0:3], s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state,
         w.focal_window, axis, w.H[axis], w.ray,
     )  # fmt: skip
 

@@ -13,6 +13,7 @@ from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.replay.flight import Flight, SensorTable
 from axialnav.replay.flight_writer import write_flight
 from axialnav.replay.simulate.course import lay_course
+from axialnav.replay.simulate.data_sheet import append_data_sheets
 from axialnav.replay.simulate.mission import Mission
 from axialnav.replay.simulate.readings import read_all
 from axialnav.replay.simulate.rig import anchors_of, build_rig
@@ -90,6 +91,7 @@ def simulate(
     if frames:
         flight = replace(flight, tables={**flight.tables, "cam0": _film(flown, out, progress)})
     write_flight(flight, out)
+    append_data_sheets(out, mission, ImuSheet(), TofSheet())
     return flight
 
 
@@ -97,7 +99,7 @@ def sensed(flown: Flown, path: Path, *, frames: bool) -> Flight:
     """The flight in memory with all readings but the camera's pictures."""
     mission = flown.mission
     sheets = ImuSheet(), TofSheet()
-    rig = build_rig(mission, *sheets, frames)
+    rig = build_rig(mission, *sheets, frames, flown.streams.of("calibration"))
     readings = read_all(mission, flown.world, flown.trajectory, rig, sheets, flown.streams)
     config = Config(
         gravity_m_s2=GRAVITY_M_S2,

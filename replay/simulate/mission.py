@@ -79,12 +79,16 @@ class VehiclePlan(_Table, frozen=True, kw_only=True):
 
 
 class CameraPlan(_Table, frozen=True, kw_only=True):
-    """The wall camera, level with the vehicle and square to its side."""
+    """The wall camera, level with the vehicle and square to its side.
+
+    ``focal_error`` is the standard deviation of its calibrated focal length, relative.
+    """
 
     side: Side = "left"
     width_px: Annotated[int, msgspec.Meta(ge=64, le=4096)] = 640
     height_px: Annotated[int, msgspec.Meta(ge=48, le=4096)] = 480
     focal_px: Positive = 320.0
+    focal_error: NonNegative = 0.001
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=500.0)] = 30.0
     exposure_s: Positive = 0.010
     readout_s: NonNegative = 0.0

@@ -15,7 +15,7 @@ from axialnav.replay.simulate.rig import ANTENNA_M, anchors_of
 from axialnav.replay.simulate.sensors.aiding import ATTITUDE_HZ, BARO_HZ, read_attitude, read_barometer
 from axialnav.replay.simulate.sensors.imu import ImuSheet, read_imu
 from axialnav.replay.simulate.sensors.tof import TofSheet, read_tof
-from axialnav.replay.simulate.sensors.uwb import Links, noise, observe, powers
+from axialnav.replay.simulate.sensors.uwb import DROPOUT, Links, noise, observe, powers
 from axialnav.replay.simulate.sensors.uwb_conditions import disturb, event_start_s
 from axialnav.replay.simulate.streams import Streams, stamps
 from axialnav.replay.simulate.vehicle import Motion, Trajectory
@@ -136,7 +136,7 @@ def _ranges(
 
 
 def _received(links: Links, rng: np.random.Generator) -> NDArray[np.bool_]:
-    return np.asarray(rng.random(len(links.anchor)) >= np.where(links.in_sight, 0.005, 0.15))
+    return np.asarray(rng.random(len(links.anchor)) >= np.where(links.in_sight, DROPOUT[True], DROPOUT[False]))
 
 
 def _differences(

@@ -35,8 +35,10 @@ def side_axes(side: str) -> Array:
     return LEFT if side == "left" else RIGHT
 
 
-def build_rig(mission: Mission, imu: ImuSheet, tof: TofSheet, frames: bool) -> dict[str, AnySensor]:
-    """Descriptions of all sensors of a mission by name, as their data sheets put it."""
+def build_rig(
+    mission: Mission, imu: ImuSheet, tof: TofSheet, frames: bool, rng: np.random.Generator
+) -> dict[str, AnySensor]:
+    """Descriptions of all sensors of a mission by name, as on their data sheets; ``rng`` draws calibration errors."""
     side = mission.camera.side
     rig: dict[str, AnySensor] = {
         "imu0": imu.spec(mission.vehicle.vibration_m_s2),
@@ -54,19 +56,19 @@ def build_rig(mission: Mission, imu: ImuSheet, tof: TofSheet, frames: bool) -> d
             sigma_m=mission.uwb.sigma_m,
         )
     if frames:
-        rig["cam0"] = camera_of(mission)
+        rig["cam0"] = camera_of(mission, 1.0 + mission.camera.focal_error * float(rng.normal()))
     return rig
 
 
-def camera_of(mission: Mission) -> Camera:
-    """The wall camera."""
+def camera_of(mission: Mission, calibration: float = 1.0) -> Camera:
+    """The wall camera, its focal length known to a factor of ``calibration``."""
     plan = mission.camera
     centre = 0.5 * (plan.width_px - 1), 0.5 * (plan.height_px - 1)
     return Camera(
         T_BS=transform(side_axes(plan.side), CAMERA_M[plan.side]),
         rate_hz=plan.rate_hz,
         resolution=(plan.width_px, plan.height_px),
-        intrinsics=(plan.focal_px, plan.focal_px, *centre),
+        intrinsics=(plan.focal_px * calibration, plan.focal_px * calibration, *centre),
         exposure_s=plan.exposure_s,
         readout_s=plan.readout_s,
         surface="wall",

@@ -1,17 +1,63 @@
-"""The planes of a corridor that the filter is told about."""
+"""The planes of a corridor that the filter is told about: the wall on the camera's side and the floor."""
 
 from __future__ import annotations
 
-from axialnav.models.rig import Surface
-from axialnav.replay.simulate.world import Facet, World
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.models.rig import Face, Surface, Vector3
+from axialnav.replay.simulate.world import Leg, World
+
+LEFT_RIGHT = {"left": 1.0, "right": -1.0}
 
 
 def surfaces_of(world: World, side: str) -> dict[str, Surface]:
-    """``wall`` and ``floor``: the plane of the first piece on the camera's side, and the first floor."""
-    return {"wall": _surface(world, side), "floor": _surface(world, "floor")}
+    """Surfaces ``wall`` and ``floor``: one plane each where the corridor is straight and level, else one face a leg.
+
+    Doorways are not told: a survey does not know which doors stand open.
+    """
+    walls = [_wall(leg, side) for leg in world.legs]
+    floors = [_floor(leg) for leg in world.legs]
+    return {"wall": _surface(walls), "floor": _surface(floors)}
 
 
-def _surface(world: World, name: str) -> Surface:
-    piece: Facet = next(f for f in world.facets if f.surface == name)
-    x, y, z = piece.normal.tolist()
-    return Surface(normal=(x, y, z), offset_m=piece.offset_m)
+def _surface(faces: list[Face]) -> Surface:
+    first = faces[0]
+    if all(_same_plane(first, face) for face in faces[1:]):
+        return Surface(normal=first.normal, offset_m=first.offset_m)
+    return Surface(normal=first.normal, offset_m=first.offset_m, face=tuple(faces))
+
+
+def _same_plane(a: Face, b: Face) -> bool:
+    return (
+        math.dist(a.normal, b.normal) < 1e-9 and abs(a.offset_m - b.offset_m) < 1e-9 and a.roughness_m == b.roughness_m
+    )
+
+
+def _wall(leg: Leg, side: str) -> Face:
+    ends = leg.left if side == "left" else leg.right
+    x, y = leg.direction
+    normal = LEFT_RIGHT[side] * np.array([y, -x, 0.0])
+    start, end = np.array([*ends[0], leg.floor[0]]), np.array([*ends[1], leg.floor[1]])
+    return Face(normal=_tuple(normal), offset_m=float(normal @ start), start=_tuple(start), end=_tuple(end))
+
+
+def _floor(leg: Leg) -> Face:
+    start, end = np.array([*leg.start, leg.floor[0]]), np.array([*leg.end, leg.floor[1]])
+    along = (end - start) / np.linalg.norm(end - start)
+    normal = np.cross(along, [-leg.direction[1], leg.direction[0], 0.0])
+    rough = leg.riser_m * math.sqrt(1.0 / 12.0)
+    return Face(
+        normal=_tuple(normal),
+        offset_m=float(normal @ start),
+        start=_tuple(start),
+        end=_tuple(end),
+        roughness_m=round(abs(rough), 4),
+    )
+
+
+def _tuple(vector: NDArray[np.float64]) -> Vector3:
+    x, y, z = (np.asarray(vector) + 0.0).tolist()
+    return x, y, z

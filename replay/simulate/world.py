@@ -74,6 +74,12 @@ class Leg:
     right: Array
 
     @property
+    def riser_m(self) -> float:
+        """Height of one step, 0 without stairs [m]."""
+        steps = max(1, round(self.plan.length_m / TREAD_M))
+        return self.plan.rise_m / steps if self.plan.kind == "stairs" else 0.0
+
+    @property
     def direction(self) -> Array:
         """Unit vector along the leg in plan view, shape (2,)."""
         along = self.end - self.start
@@ -188,10 +194,8 @@ def _leg_facets(leg: Leg) -> list[Facet]:
         "floor": np.vstack([_at(leg.right, low), _at(leg.left[::-1], low[::-1])]),
         "ceiling": np.vstack([_at(leg.left, high), _at(leg.right[::-1], high[::-1])]),
     }
-    steps = max(1, round(plan.length_m / TREAD_M))
-    riser = plan.rise_m / steps if plan.kind == "stairs" else 0.0
     facets = [
-        Facet("floor", index, corners["floor"], plan.floor, riser),
+        Facet("floor", index, corners["floor"], plan.floor, leg.riser_m),
         Facet("ceiling", index, corners["ceiling"], plan.ceiling),
     ]
     for side, look in (("left", plan.left), ("right", plan.right)):
