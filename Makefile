@@ -8,16 +8,17 @@ INSTALLED := $(VENV)/installed.stamp
 DOCS_INSTALLED := $(VENV)/installed-docs.stamp
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: help demo test quick lint docs bench bench-flights bench-motion bench-fusion readme-check clean
+.PHONY: help demo paper test quick lint docs bench bench-flights bench-motion bench-fusion readme-check clean
 .DEFAULT_GOAL := help
 
 help:
-	@echo "make demo          replay a flight and write runs/demo/report.html"
+	@echo "make demo          fly a simulated corridor, replay it and write runs/demo/report.html"
 	@echo "make test          the whole test suite"
 	@echo "make quick         the test suite without the long statistical runs"
 	@echo "make lint          style, types and layering"
 	@echo "make docs          the documentation, into docs/_build/html"
 	@echo "make bench         accuracy on the real flights; also bench-motion, bench-fusion, bench-faults"
+	@echo "make paper         the paper's field flights again, simulated: Table 1 and Fig. 11 into runs/paper"
 	@echo "make readme-check  run every command of the README in a fresh clone"
 	@echo "make clean         remove what the commands above have made, .venv included"
 
@@ -58,6 +59,10 @@ docs: $(DOCS_INSTALLED)
 bench: bench-flights
 bench-flights bench-motion bench-fusion bench-faults: bench-%: $(INSTALLED)
 	@$(BIN)/python -m tests.bench.bench_$*
+
+paper: $(INSTALLED)
+	@$(BIN)/axialnav motion --experiment field --out runs/paper
+	@echo "runs/paper/field.csv runs/paper/field.svg"
 
 readme-check: $(INSTALLED)
 	@$(BIN)/python -m tests.readme_check

@@ -76,19 +76,22 @@ def replay(
 
 
 def demo(*, out: Path = Path("runs/demo")) -> int:
-    """Replay the flight that ships with axialnav and write its run folder with report.html.
+    """Fly a simulated corridor with camera frames (straight, stairs, a reflecting corner), replay and report it.
 
     Parameters
     ----------
     out
-        Run folder to write.
+        Run folder to write; the flight itself goes into its folder flight.
     """
+    from axialnav.replay.flight import load_flight
     from axialnav.replay.run import replay as run_replay
-    from axialnav.replay.sample_flights import sample_flight_path
+    from axialnav.replay.simulate.demo import fly_demo
 
     _refuse_flight_folder(out)
-    with progress_bar("demo") as progress:
-        run = run_replay(sample_flight_path(), progress=progress)
+    with progress_bar("demo: fly") as progress:
+        fly_demo(out / "flight", progress)
+    with progress_bar("demo: replay") as progress:
+        run = run_replay(load_flight(out / "flight"), progress=progress)
     return _finish(run, out)
 
 

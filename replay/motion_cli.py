@@ -53,7 +53,8 @@ def motion_command(
     out
         CSV file to write, one line per window; for an experiment the folder of its table and figure.
     experiment
-        Run one of the paper's experiments on rendered walls instead: single-vs-composite, frames, calibration.
+        Run one of the paper's experiments on rendered walls instead: single-vs-composite, frames, calibration,
+        field.
     seed
         Of the experiment's random numbers.
     trials

@@ -13,6 +13,7 @@ EXPERIMENTS = {
     "single-vs-composite": "axialnav.replay.experiments.single_vs_composite",
     "frames": "axialnav.replay.experiments.frame_count",
     "calibration": "axialnav.replay.experiments.calibration",
+    "field": "axialnav.replay.experiments.field",
 }
 """Name on the command line and the module whose ``run(out, seed, trials)`` does it."""
 
@@ -23,13 +24,14 @@ def experiment_command(name: str, out: Path, seed: int = 1, trials: int | None =
     Parameters
     ----------
     name
-        ``single-vs-composite`` (Fig. 5-7), ``frames`` (Fig. 8) or ``calibration`` (Fig. 9).
+        ``single-vs-composite`` (Fig. 5-7), ``frames`` (Fig. 8), ``calibration`` (Fig. 9) or ``field`` (Table 1 and
+        Fig. 11).
     out
         Folder to write into; made if missing.
     seed
         Of every random number; equal seeds give equal tables.
     trials
-        Windows per condition; None for the experiment's own number.
+        Windows per condition, for ``field`` seconds per flight; None for the experiment's own number.
 
     Returns
     -------

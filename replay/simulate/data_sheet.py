@@ -15,7 +15,7 @@ from axialnav.replay.simulate.sensors.tof import TofSheet
 
 def append_data_sheets(folder: Path, mission: Mission, imu: ImuSheet, tof: TofSheet) -> None:
     """Add the data sheet to every ``sensor.yaml`` below ``folder``/mav0."""
-    sheets = {
+    sheets: dict[str, dict[str, float | str]] = {
         "imu0": _numbers(imu) | {"vibration_m_s2": mission.vehicle.vibration_m_s2},
         "tof0": _numbers(tof),
         "tof1": _numbers(tof),

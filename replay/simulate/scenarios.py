@@ -44,7 +44,7 @@ def corner(duration_s: float) -> Mission:
 
 def mission(duration_s: float) -> Mission:
     """Straight, stairs, straight, a reflecting corner, straight, with stops on the way."""
-    run = max(duration_s - OVERHEAD_S - 12.0, 12.0)
+    run = max(0.85 * (duration_s - OVERHEAD_S) - 6.0, 12.0)
     flat = SectionPlan(kind="straight", length_m=0.25 * run)
     up = SectionPlan(kind="stairs", length_m=0.25 * run, rise_m=0.12 * run)
     turn = SectionPlan(kind="corner", length_m=3.0, turn_deg=-90.0)

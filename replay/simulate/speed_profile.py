@@ -17,12 +17,14 @@ PAPER_SPEEDS = (0.5, 1.0, 0.75, 1.25, 0.6, 1.1)  # of the commanded speed: slow 
 PAPER_EVERY_M = 5.0
 GRID_S = 0.01
 REST_S = 2.0  # at the end
+BEYOND_S = 1.0
 
 
 def distance_over_time(plan: VehiclePlan, length_m: float, duration_s: float | None) -> tuple[Array, Array]:
     """Instants [s] and distance flown [m], shape (n,) each, ``GRID_S`` apart.
 
     Standing still first, then the stretches of the profile, then standing again; cut or prolonged to ``duration_s``.
+    The last ``BEYOND_S`` go on after the end of the flight, so that a flight that is cut ends in motion.
     """
     speeds, times = [0.0], [plan.still_s]
     for speed, stretch_m, pause_s in _stretches(plan, length_m):
@@ -34,7 +36,7 @@ def distance_over_time(plan: VehiclePlan, length_m: float, duration_s: float | N
     t, v = _timeline(plan, speeds, times)
     distance = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
     end = t[-1] + REST_S if duration_s is None else duration_s
-    grid = np.arange(round(end / GRID_S) + 1) * GRID_S
+    grid = np.arange(round((end + BEYOND_S) / GRID_S) + 1) * GRID_S
     return grid, np.interp(grid, t, distance)
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from axialnav.replay.simulate.course import Course, smoothstep
 from axialnav.replay.simulate.mission import VehiclePlan
-from axialnav.replay.simulate.speed_profile import distance_over_time
+from axialnav.replay.simulate.speed_profile import BEYOND_S, distance_over_time
 
 Array = NDArray[np.float64]
 KNOT_S = 0.05
@@ -107,7 +107,7 @@ def fly(
         Draws the phases of the control errors.
     """
     grid, flown = distance_over_time(plan, course.length_m, duration_s)
-    end = float(grid[-1])
+    end = float(grid[-1]) - BEYOND_S
     knots: Array = KNOT_S * np.arange(-4.0, round(end / KNOT_S) + 6.0).astype(np.float64)
     s = np.interp(knots, grid, flown)
     s = _mean_over_knot(knots, grid, flown, s)

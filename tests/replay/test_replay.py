@@ -48,7 +48,8 @@ def test_two_replays_in_one_process_give_one_digest(run: Run) -> None:
 
 
 def test_a_replay_in_another_process_gives_the_same_digest(run: Run, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "axialnav", "demo", "--out", str(tmp_path / "demo")]
+    log = str(sample_flight_path())
+    command = [sys.executable, "-m", "axialnav", "replay", log, "--out", str(tmp_path / "demo")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     assert done.stderr == ""
     assert "horizontal speed vs GPS" in done.stdout
@@ -128,7 +129,8 @@ def test_a_flight_without_an_imu_cannot_be_replayed(tmp_path: Path, capsys: pyte
 
 
 def test_a_reader_that_walks_away_does_not_spoil_the_run(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "axialnav", "demo", "--out", str(tmp_path / "demo")]
+    log = str(sample_flight_path())
+    command = [sys.executable, "-m", "axialnav", "replay", log, "--out", str(tmp_path / "demo")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     assert process.stderr is not None
