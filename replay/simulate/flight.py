@@ -105,7 +105,7 @@ def sensed(flown: Flown, path: Path, *, frames: bool) -> Flight:
         gravity_m_s2=GRAVITY_M_S2,
         corridor=flown.world.corridor,
         initial=_initial(flown),
-        surface=surfaces_of(flown.world, mission.camera.side),
+        surface=surfaces_of(flown.world, mission.camera.side, sheets[1].rate_hz / mission.vehicle.speed_m_s),
         sensor=rig,
     )
     info = {"source": "axialnav simulate", "licence": "CC0-1.0", "note": f"simulated, seed {flown.streams.seed}"}

@@ -8,18 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.models.rig import Face, Surface, Vector3
-from axialnav.replay.simulate.world import Leg, World
+from axialnav.replay.simulate.world import TREAD_M, Leg, World
 
 LEFT_RIGHT = {"left": 1.0, "right": -1.0}
 
 
-def surfaces_of(world: World, side: str) -> dict[str, Surface]:
+def surfaces_of(world: World, side: str, beams_per_m: float) -> dict[str, Surface]:
     """Surfaces ``wall`` and ``floor``: one plane each where the corridor is straight and level, else one face a leg.
 
-    Doorways are not told: a survey does not know which doors stand open.
+    Doorways are not told: a survey does not know which doors stand open.  Neighbouring beams on one tread are off the
+    incline together, so that the roughness of stairs is that of a step times the root of the beams per tread:
+    ``beams_per_m`` is the floor range finder's rate over the usual speed.
     """
     walls = [_wall(leg, side) for leg in world.legs]
-    floors = [_floor(leg) for leg in world.legs]
+    floors = [_floor(leg, beams_per_m) for leg in world.legs]
     return {"wall": _surface(walls), "floor": _surface(floors)}
 
 
@@ -44,11 +46,11 @@ def _wall(leg: Leg, side: str) -> Face:
     return Face(normal=_tuple(normal), offset_m=float(normal @ start), start=_tuple(start), end=_tuple(end))
 
 
-def _floor(leg: Leg) -> Face:
+def _floor(leg: Leg, beams_per_m: float) -> Face:
     start, end = np.array([*leg.start, leg.floor[0]]), np.array([*leg.end, leg.floor[1]])
     along = (end - start) / np.linalg.norm(end - start)
     normal = np.cross(along, [-leg.direction[1], leg.direction[0], 0.0])
-    rough = leg.riser_m * math.sqrt(1.0 / 12.0)
+    rough = leg.riser_m * math.sqrt(max(1.0, beams_per_m * TREAD_M) / 12.0)
     return Face(
         normal=_tuple(normal),
         offset_m=float(normal @ start),
