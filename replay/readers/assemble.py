@@ -106,20 +106,26 @@ class Assembly:
     def _there(self) -> str:
         names = [stream.name for stream in self._streams if len(stream.t_ns)]
         more = f" and {len(names) - SHOWN_STREAMS} more" if len(names) > SHOWN_STREAMS else ""
-        listed = ", ".join(names[:SHOWN_STREAMS]) or "nothing"
-        return f"there are {listed}{more}; say what is what in a mapping ({self._path.name}.toml)"
+        if not names:
+            return "it has no messages at all; was it cut?"
+        listed = ", ".join(names[:SHOWN_STREAMS]) + more
+        return f"there are {listed}; say what is what in a mapping ({self._path.name}.toml)"
 
     def _stream(self, name: str) -> Stream | None:
         source = self._mapping.source.get(name)
-        if source is None:
+        if source is None or any(self._named(better) for better in source.unless):
             return None
         for wanted in source.streams:
-            for stream in self._streams:
-                if stream.matches(wanted) and len(stream.t_ns):
-                    return stream
+            stream = self._named(wanted)
+            if stream is not None:
+                return stream
         if name in self._asked:
             raise FlightError(f"{self._path}: no {' or '.join(source.streams)} for {name}; {self._there()}")
         return None
+
+    def _named(self, wanted: str) -> Stream | None:
+        """First stream of that name or type that is not empty."""
+        return next((s for s in self._streams if s.matches(wanted) and len(s.t_ns)), None)
 
     def _truth_rows(self) -> Rows | None:
         stream = self._stream(TRUTH)

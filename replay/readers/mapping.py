@@ -25,6 +25,8 @@ class Source(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ----------
     streams
         Names or types of streams; the first that the log has is read.  In the file: ``from``.
+    unless
+        Streams that are better: where the log has one of them, this source is not read.
     stamp, stamp_unit
         Field that holds the time, and its unit; None: the time that the format gives every message.
     where
@@ -34,6 +36,7 @@ class Source(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """
 
     streams: tuple[str, ...]
+    unless: tuple[str, ...] = ()
     stamp: str | None = None
     stamp_unit: Literal["ns", "us", "ms", "s"] = "us"
     where: str | None = None

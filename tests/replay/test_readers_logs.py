@@ -220,3 +220,28 @@ def test_expressions_are_products_with_alternatives() -> None:
     assert holds("a > 1 and b.c <= 5 and none == 3", columns, 2).tolist() == [False, True]
     with pytest.raises(MissingFieldError, match="none"):
         evaluate("none", columns, 2)
+
+
+@pytest.mark.parametrize("better", [False, True])
+def test_raw_imu_of_a_tlog_is_taken_where_there_is_nothing_better(tmp_path: Path, better: bool) -> None:
+    import struct
+
+    from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+    link = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    with (tmp_path / "a.tlog").open("wb") as file:
+        for k in range(200):
+            us = 20_000 * k
+            messages = [dialect.MAVLink_raw_imu_message(us, 10, -20, -1001, 100, -200, 300, 0, 0, 0)]
+            if better:
+                rest = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 63)
+                messages.append(dialect.MAVLink_highres_imu_message(us, 0.1, -0.2, -9.8, 0.01, 0.02, 0.03, *rest))
+            for message in messages:
+                file.write(struct.pack(">Q", 1_700_000_000_000_000 + us) + message.pack(link))
+    flight = load_flight(tmp_path / "a.tlog")
+    assert list(flight.tables) == (["imu0"] if better else ["imu1"])
+    [imu] = flight.tables.values()
+    assert imu.t_ns.tolist() == [20_000_000 * k for k in range(200)]
+    expected = [0.1, 0.2, 9.8] if better else [0.0980665, 0.196133, 9.81645665]
+    assert imu.columns["accel_m_s2"][7].tolist() == pytest.approx(expected, rel=1e-6)
+    assert imu.columns["gyro_rad_s"][7].tolist() == pytest.approx([0.01, -0.02, -0.03] if better else [0.1, 0.2, -0.3])
