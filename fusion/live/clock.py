@@ -60,6 +60,11 @@ class BootClock:
         self._correction_ns = 0.0
 
     @property
+    def in_doubt(self) -> bool:
+        """Whether stamps or answers of late do not fit: ask faster."""
+        return self._suspicions > 0 or self._doubted_ns is not None
+
+    @property
     def drift_ppm(self) -> float:
         """How much faster the companion's clock runs, parts per million."""
         return self._drift * 1e6

@@ -177,6 +177,7 @@ class Node:
             "nooploop": {
                 line.device: stage.status() for line, stage in zip(self._vehicle.nooploop, self._lines, strict=True)
             },
+            "processor_s": self._processor_s(),
             "latency": {name: histogram.summary() for name, histogram in self._histograms().items()},
         }
 
@@ -207,6 +208,11 @@ class Node:
             return None
         counts = {**self._grabber.counts, **self._motion.counts, "overwritten": self._grabber.mailbox.dropped}
         return {**counts, "rate_hz": self._grabber.rate_hz, "ended": self._grabber.ended}
+
+    def _processor_s(self) -> dict[str, float]:
+        """Processor time of each thread so far [s]."""
+        alive = [thread for thread in self._threads if thread.is_alive() and thread.ident is not None]
+        return {t.name: round(time.clock_gettime(time.pthread_getcpuclockid(t.ident or 0)), 3) for t in alive}
 
     def _histograms(self) -> dict[str, Latency]:
         camera = {"camera": self._motion.latency} if self._motion is not None else {}

@@ -38,7 +38,8 @@ class Timesync:
             return
         if self._clock.epoch != self._epoch:
             self._epoch, self.asked = self._clock.epoch, 0
-        self._next_ns = now + (FAST_NS if self.asked < FAST_QUESTIONS else SLOW_NS)
+        fast = self.asked < FAST_QUESTIONS or self._clock.in_doubt
+        self._next_ns = now + (FAST_NS if fast else SLOW_NS)
         stamp = self._now()
         self._open[stamp] = None
         while len(self._open) > OPEN_QUESTIONS:

@@ -222,6 +222,8 @@ class StreamedVehicle:
             if self.stop.is_set():
                 return
             self._plan(due, t, k, name, data)
+        while due:
+            self._deliver(*heapq.heappop(due)[2:])
 
     def _plan(self, due: list[tuple[float, int, str, bytes]], t: float, k: int, name: str, data: Any) -> None:
         if self.silent(name, t):
