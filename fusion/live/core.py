@@ -84,6 +84,8 @@ class FilterCore:
         Reason -> readings that the filter did not take.
     restarts
         Reason -> how often the filter was started anew.
+    began_ns
+        Stamp of the first inertial sample of the present filter; None before it.
     """
 
     def __init__(self, make_config: Callable[[], Config], kind: str = "corridor", tap: Tap | None = None) -> None:
@@ -92,6 +94,7 @@ class FilterCore:
         self.restarts: Counter[str] = Counter()
         self._make_config, self._kind, self._tap = make_config, kind, tap
         self._lock = threading.Lock()
+        self.began_ns: int | None = None
         self._imu: ImuSample | None = None
         self._aid_ns = LONG_AGO_NS
         self._count = 0
@@ -121,6 +124,7 @@ class FilterCore:
                 self._restart(f"cannot start: {error}", reading.t_ns)
                 return None
             if isinstance(reading, ImuSample):
+                self.began_ns = self.began_ns or reading.t_ns
                 if self._imu is None or reading.t_ns > self._imu.t_ns:
                     self._imu = reading
             elif outcome.verdict is Verdict.FUSED:
@@ -168,7 +172,7 @@ class FilterCore:
         self._sick, self._last = False, None
         self.restarts[reason] += 1
         self._count += 1
-        self._imu, self._aid_ns = None, LONG_AGO_NS
+        self._imu, self._aid_ns, self.began_ns = None, LONG_AGO_NS, None
         self._estimator = self._new(last, max(gap_s, 0.0))
 
 

@@ -199,6 +199,7 @@ class Node:
             "verdicts": verdicts,
             "refused": dict(self.core.refused),
             "restarts": dict(self.core.restarts),
+            "began_ns": self.core.began_ns,
             "waiting": len(self._queue),
             "dropped": self._queue.dropped,
         }
