@@ -18,6 +18,7 @@ help:
 	@echo "make lint          style, types and layering"
 	@echo "make docs          the documentation, into docs/_build/html"
 	@echo "make bench         accuracy on the real flights; also bench-motion, bench-fusion, bench-faults, bench-corridor, bench-live"
+	@echo "make paper         the paper's field flights again, simulated: Table 1 and Fig. 11 into runs/paper"
 	@echo "make readme-check  run every command of the README in a fresh clone"
 	@echo "make clean         remove what the commands above have made, .venv included"
 
