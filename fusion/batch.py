@@ -36,7 +36,7 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import InnovationLog, Reason, Track, Verdict, verdict_of
 from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors
-from axialnav.models.state import E_ATT, E_POS, E_VEL, N_ERROR, NOMINAL_SLICES
+from axialnav.models.state import E_POS, E_VEL, N_ERROR, NOMINAL_SLICES
 
 Array = NDArray[np.float64]
 CHUNKS = 50
@@ -133,7 +133,7 @@ def unpack_track(t_ns: NDArray[np.int64], rows: Array) -> Track:
         **scalars,
         position_covariance=_covariance(variance[:, E_POS : E_POS + 3], rows[:, TRACK_POS_CROSS : TRACK_POS_CROSS + 3]),
         velocity_covariance=_covariance(variance[:, E_VEL : E_VEL + 3], rows[:, TRACK_VEL_CROSS : TRACK_VEL_CROSS + 3]),
-        sigma_attitude_rad=np.sqrt(variance[:, E_ATT : E_ATT + 3]),
+        sigma_error=np.sqrt(np.maximum(variance, 0.0)),
         flags=rows[:, TRACK_FLAGS].astype(np.int64),
         resets=rows[:, TRACK_RESETS].astype(np.int64),
     )

@@ -149,8 +149,8 @@ class Track:
     """The estimate at every IMU sample; arrays over n samples, corridor frame, SI units.
 
     ``position_covariance`` and ``velocity_covariance`` are (n, 3, 3), ``quaternion_WB`` (n, 4) scalar first,
-    ``uwb_bias_m`` (n, 8), ``sigma_attitude_rad`` (n, 3) in body axes, ``flags`` (n,) of :class:`Health`,
-    ``resets`` (n,) running count.
+    ``uwb_bias_m`` (n, 8), ``sigma_error`` (n, 25) the standard deviation of every error state in the order of
+    :mod:`axialnav.models.state`, ``flags`` (n,) of :class:`Health`, ``resets`` (n,) running count.
     """
 
     t_ns: NDArray[np.int64]
@@ -164,7 +164,7 @@ class Track:
     wall_offset_m: Array
     position_covariance: Array
     velocity_covariance: Array
-    sigma_attitude_rad: Array
+    sigma_error: Array
     flags: NDArray[np.int64]
     resets: NDArray[np.int64]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -136,17 +137,17 @@ def run_motion(
     return MotionRun(flight.name, camera, method, frames, len(table), straight, tuple(estimates), period_s, truth)
 
 
-def pictures(flight: Flight, camera: str) -> Iterator[NDArray[np.generic]]:
-    """Pictures of a camera in the order of its table, from a video or one file each."""
+def pictures(flight: Flight, camera: str, start: int = 0) -> Iterator[NDArray[np.generic]]:
+    """Pictures of a camera in the order of its table from row ``start`` on, from a log, a video or one file each."""
     if camera in flight.frames:
-        yield from flight.frames[camera]()
+        yield from islice(flight.frames[camera](), start, None)
         return
     folder, table = flight.path / "mav0" / camera, flight.tables[camera]
     videos = sorted(folder.glob("video.*"))
     if videos:
-        yield from read_video(videos[0])
+        yield from islice(read_video(videos[0]), start, None)
         return
-    for name in table.columns["filename"].tolist():
+    for name in table.columns["filename"][start:].tolist():
         yield read_picture(Path(folder / "data" / str(name)))
 
 

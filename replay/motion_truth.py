@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.errors import ConfigError
-from axialnav.models.rig import Camera
+from axialnav.models.rig import Camera, Sensor, Surface
 from axialnav.replay.flight import Flight
 from axialnav.replay.reference import interpolate
 
@@ -107,7 +107,7 @@ def _seen_from_camera(
     truth = flight.truth
     assert truth is not None
     quaternion = interpolate(t_ns, truth.t_ns, _continuous(truth.quaternion_WB), MAX_GAP_NS)
-    R_WB = _rotations(quaternion)
+    R_WB = rotation_matrices(quaternion)
     rate_B = _interpolated_rates(truth.t_ns, _continuous(truth.quaternion_WB), t_ns)
     velocity_W = interpolate(t_ns, truth.t_ns, truth.velocity_m_s, MAX_GAP_NS)
     R_BS, lever = camera.rotation_BS, camera.lever_arm_m
@@ -115,16 +115,21 @@ def _seen_from_camera(
     if distance_m is not None:
         depth = np.full(len(t_ns), distance_m)
     else:
-        depth = _depth(flight, camera, R_WB, interpolate(t_ns, truth.t_ns, truth.position_m, MAX_GAP_NS))
+        surface = flight.config.surface[camera.surface or ""]
+        position = interpolate(t_ns, truth.t_ns, truth.position_m, MAX_GAP_NS)
+        depth = surface_depth(surface, camera, R_WB, position, float(surface.offset_m))
     return velocity_B @ R_BS, rate_B @ R_BS, depth
 
 
-def _depth(flight: Flight, camera: Camera, R_WB: Array, position_W: Array) -> Array:
-    surface = flight.config.surface[camera.surface or ""]
-    eye = position_W + np.einsum("nij,j->ni", R_WB, camera.lever_arm_m)
-    ray = np.einsum("nij,j->ni", R_WB, camera.rotation_BS[:, 2])
+def surface_depth(surface: Surface, sensor: Sensor, R_WB: Array, position_W: Array, offset_m: Array | float) -> Array:
+    """Distance of a surface along the sensor's optical axis [m], NaN where that does not meet it.
+
+    R_WB (n, 3, 3), position_W (n, 3); ``offset_m``, (n,) or a number, is that of a surface without faces.
+    """
+    eye = position_W + np.einsum("nij,j->ni", R_WB, sensor.lever_arm_m)
+    ray = np.einsum("nij,j->ni", R_WB, sensor.rotation_BS[:, 2])
     if not surface.face:
-        return _plane_depth(np.array(surface.normal), float(surface.offset_m), eye, ray)
+        return _plane_depth(np.array(surface.normal), offset_m, eye, ray)
     depths = np.full((len(surface.face), len(eye)), np.inf)
     for depth, face in zip(depths, surface.face, strict=True):
         normal, start = np.array(face.normal), np.array(face.start)
@@ -137,7 +142,7 @@ def _depth(flight: Flight, camera: Camera, R_WB: Array, position_W: Array) -> Ar
     return np.where(np.isfinite(nearest), nearest, np.nan)
 
 
-def _plane_depth(normal: Array, offset_m: float, eye: Array, ray: Array) -> Array:
+def _plane_depth(normal: Array, offset_m: Array | float, eye: Array, ray: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = (offset_m - eye @ normal) / (ray @ normal)
     return np.where(depth > 0.0, depth, np.nan)
@@ -150,7 +155,8 @@ def _continuous(quaternion: Array) -> Array:
     return np.vstack([quaternion[:1], quaternion[1:] * sign[:, None]])
 
 
-def _rotations(quaternion: Array) -> Array:
+def rotation_matrices(quaternion: Array) -> Array:
+    """Matrices (n, 3, 3) of quaternions (n, 4), scalar first, of any length but zero."""
     w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

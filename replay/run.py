@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
@@ -15,6 +15,9 @@ from axialnav.models.rig import AttitudeSource, Imu
 from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.frames import with_pixel_motion
 from axialnav.replay.fused import Column, digest, fused_columns
+
+if TYPE_CHECKING:
+    from axialnav.fusion.batch import BatchResult
 
 ESTIMATORS = ("corridor", "axial")
 MIN_IMU_SAMPLES = 2
@@ -36,6 +39,8 @@ class Run:
         Columns of ``fused.csv`` in file order.
     metrics
         The dictionary of ``metrics.json``.
+    handedness
+        ``"left"`` where the survey was found to be left-handed: the track is then mirrored, its attitude is not.
     """
 
     flight: Flight
@@ -44,6 +49,7 @@ class Run:
     log: InnovationLog
     columns: dict[str, Column]
     metrics: dict[str, Any]
+    handedness: str = "right"
 
     @property
     def table(self) -> str:
@@ -101,12 +107,13 @@ def replay(
     loaded = flight if isinstance(flight, Flight) else load_flight(flight)
     started = time.perf_counter()
     resolved = resolve(config, loaded, without=without, params=params)
-    track, log, kernel_s = _filter(loaded, resolved, estimator, smooth, progress)
+    result = _filter(loaded, resolved, estimator, smooth, progress)
+    track, log = result.track, result.log
     columns = fused_columns(track, resolved.corridor)
     scores = score(track, log, loaded, resolved)
     head = {"flight": loaded.name, "estimator": estimator, "smoothed": smooth, "digest": digest(columns)}
-    timing = _timing(track, kernel_s, time.perf_counter() - started)
-    return Run(loaded, resolved, track, log, columns, {**head, **scores, "timing": timing})
+    timing = _timing(track, result.kernel_s, time.perf_counter() - started)
+    return Run(loaded, resolved, track, log, columns, {**head, **scores, "timing": timing}, result.handedness)
 
 
 def resolve(
@@ -128,7 +135,7 @@ def _refuse_unknown(estimator: str, smooth: bool) -> None:
 
 def _filter(
     flight: Flight, config: Config, estimator: str, smooth: bool, progress: Callable[[float], None] | None
-) -> tuple[Track, InnovationLog, float]:
+) -> BatchResult:
     from axialnav.fusion.axial_estimator import run_axial
     from axialnav.fusion.batch import run_batch
     from axialnav.fusion.smoother import run_smoothed
@@ -136,8 +143,7 @@ def _filter(
     _require_samples(flight, config, estimator)
     tables = with_pixel_motion(flight, config, flight.tables_for(config))
     run = run_axial if estimator == "axial" else run_smoothed if smooth else run_batch
-    result = run(config, tables, progress)
-    return result.track, result.log, result.kernel_s
+    return run(config, tables, progress)
 
 
 def _require_samples(flight: Flight, config: Config, estimator: str) -> None:

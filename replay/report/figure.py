@@ -19,6 +19,7 @@ BLUE, ORANGE, GREEN, RED = "#3b82d6", "#e0851b", "#2fa36b", "#dc4b4b"
 PURPLE, GREY = "#9a6bd8", "#8b929c"
 AXIS_COLOURS = (BLUE, ORANGE, GREEN)
 MAX_BAND_STRETCHES = 40
+MAX_BAND_POINTS = 1000
 TIME = "time after the first IMU sample [s]"
 
 
@@ -44,7 +45,7 @@ class Figure:
             layout["xaxis"]["range"] = [0.0, span_s]
         for key, value in self.layout.items():
             layout[key] = {**layout[key], **value} if isinstance(layout.get(key), dict) else value
-        return {"traces": list(self.traces), "layout": layout}
+        return {"traces": list(self.traces), "layout": layout, "time": self.x_title == TIME}
 
 
 def numbers(values: Array) -> dict[str, str]:
@@ -83,7 +84,7 @@ def band(seconds: Array, low: Array, high: Array, name: str, colour: str) -> lis
     """Shaded area between two series, one stretch between gaps each, one entry in the legend."""
     cuts = gap_starts(seconds)[: MAX_BAND_STRETCHES - 1] + 1
     traces: list[Trace] = []
-    share = max(2000 // (cuts.size + 1), 2)
+    share = max(MAX_BAND_POINTS // (cuts.size + 1), 2)
     for rows in np.split(np.arange(seconds.size), cuts):
         x, lower, upper = envelope(seconds[rows], low[rows], high[rows], share)
         around = np.concatenate((x, x[::-1])), np.concatenate((upper, lower[::-1]))

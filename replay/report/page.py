@@ -10,6 +10,7 @@ from axialnav.replay.report.section import Section
 from axialnav.replay.report.sections import (
     axial,
     biases,
+    frames,
     innovations,
     position,
     provenance,
@@ -21,7 +22,7 @@ from axialnav.replay.report.sections import (
 )
 from axialnav.replay.run import Run
 
-SECTIONS = (verdict, axial, speed, strip, innovations, whiteness, position, biases, settings, provenance)
+SECTIONS = (verdict, axial, speed, strip, innovations, whiteness, frames, position, biases, settings, provenance)
 TEMPLATES = Path(__file__).parent / "templates"
 
 

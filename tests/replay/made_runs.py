@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.config import Config, Corridor, Initial
 from axialnav.fusion.outcome import Health, InnovationLog, Reason, Track, Verdict
 from axialnav.models.rig import Imu, RangeFinder, Surface, Uwb
+from axialnav.models.state import N_ERROR
 from axialnav.replay.flight import Flight, SensorTable, Truth
 from axialnav.replay.fused import digest, fused_columns
 from axialnav.replay.metrics import score
@@ -66,7 +67,7 @@ def make_track(velocity_error: Array, position_error: Array | None = None, sigma
         wall_offset_m=np.zeros(count),
         position_covariance=np.tile(0.01 * np.eye(3), (count, 1, 1)),
         velocity_covariance=np.tile(sigma_m_s**2 * np.eye(3), (count, 1, 1)),
-        sigma_attitude_rad=np.full((count, 3), 0.01),
+        sigma_error=np.full((count, N_ERROR), 0.01),
         flags=np.zeros(count, dtype=np.int64),
         resets=np.zeros(count, dtype=np.int64),
     )

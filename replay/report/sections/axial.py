@@ -6,10 +6,34 @@ import numpy as np
 
 from axialnav.replay.alignment import IDENTITY, RigidMotion
 from axialnav.replay.axial import along, axial_frame, sigma_along
+from axialnav.replay.image_velocity import image_velocities
 from axialnav.replay.reference import Matched, match
-from axialnav.replay.report.figure import BLUE, GREY, ORANGE, RED, Figure, band, line
+from axialnav.replay.report.corridor import section_marks
+from axialnav.replay.report.decimate import scatter_rows
+from axialnav.replay.report.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    Figure,
+    Trace,
+    band,
+    line,
+    points,
+)
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
+
+IMAGE_COLOURS = (GREEN, PURPLE)
+DOT = {"size": 3, "opacity": 0.45}
+CROSS = {"size": 5, "opacity": 0.8, "symbol": "x"}
+CAPTION = (
+    "Shaded: 3 sigma as the filter states it. Dots: the velocity that each reading of the image motion asks for at the "
+    "calibrated scale, with the filter's distance and attitude; crosses were refused by the gate. The line breaks "
+    "where the IMU was silent."
+)
 
 
 def build(run: Run) -> Section:
@@ -41,14 +65,29 @@ def _velocity(run: Run, motion: RigidMotion) -> Figure:
     sigma = sigma_along(axis, motion.covariances(track.velocity_covariance))
     traces = band(seconds, velocity - 3.0 * sigma, velocity + 3.0 * sigma, "3 sigma", BLUE)
     traces.append(line(seconds, velocity, "fused", BLUE))
+    traces += _image(run) if motion is IDENTITY else []
     if truth is not None:
         frame = axial_frame(run.config.corridor, truth.position_m)
         true_seconds = (truth.t_ns - track.t_ns[0]) * 1e-9
         traces.append(line(true_seconds, along(frame.axis, truth.velocity_m_s), "truth", ORANGE, dash="dot"))
     # a wide band at the start must not flatten the flight
     room = 0.5 + 1.5 * float(np.nanpercentile(np.abs(np.append(velocity, 0.0)), 99.5))
-    caption = "Shaded: 3 sigma as the filter states it. The line breaks where the IMU was silent."
-    return Figure(traces, "axial velocity [m/s]", caption, height_px=380, layout={"yaxis": {"range": [-room, room]}})
+    layout = {"yaxis": {"range": [-room, room]}, **section_marks(run, motion)}
+    return Figure(traces, "axial velocity [m/s]", CAPTION, height_px=400, layout=layout)
+
+
+def _image(run: Run) -> list[Trace]:
+    """Readings of image sensors as velocities: dots where they were fused, crosses where the gate refused them."""
+    traces = []
+    for colour, found in zip(IMAGE_COLOURS * 4, image_velocities(run), strict=False):
+        seconds = (found.t_ns - run.track.t_ns[0]) * 1e-9
+        for chosen, verdict, look in ((found.fused, "", DOT), (~found.fused, " gated", CROSS)):
+            rows = np.flatnonzero(chosen)
+            rows = rows[scatter_rows(found.velocity_m_s[rows])]
+            if rows.size:
+                name = f"image motion, {found.sensor}{verdict}"
+                traces.append(points(seconds[rows], found.velocity_m_s[rows], name, colour, **look))
+    return traces
 
 
 def _error(run: Run, matched: Matched) -> Figure:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.outcome import Health, Verdict
+from axialnav.replay.report.corridor import section_marks
 from axialnav.replay.report.figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, Figure
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
@@ -29,14 +30,17 @@ def build(run: Run) -> Section:
     """Each cell has the colour of what happened to most readings in it; the pointer shows all counts."""
     edges = np.linspace(0.0, max((run.track.t_ns[-1] - run.track.t_ns[0]) * 1e-9, 1e-3), BINS + 1)
     rows = [*_sensor_rows(run, edges), *_condition_rows(run, edges)]
-    note = "Colour: what happened to most readings of that moment. White space: no reading. Blind is not a rejection."
-    figure = Figure(
-        _heatmap(rows, edges),
-        "",
-        _resets_caption(run),
-        height_px=110 + 34 * len(rows),
-        layout={"shapes": _reset_lines(run), "yaxis": {"autorange": "reversed", "fixedrange": True}},
+    note = (
+        "Colour: what happened to most readings of that moment. White space: no reading. Blind is not a rejection. "
+        "Dotted grey: the next section of the corridor begins."
     )
+    marks = section_marks(run, inside=False)
+    layout = {
+        **marks,
+        "shapes": [*marks.get("shapes", ()), *_reset_lines(run)],
+        "yaxis": {"autorange": "reversed", "fixedrange": True},
+    }
+    figure = Figure(_heatmap(rows, edges), "", _resets_caption(run), height_px=110 + 34 * len(rows), layout=layout)
     legend = [(verdict.name.lower(), colour) for verdict, colour in COLOURS.items()]
     return Section(
         "Sensors over time", [figure], "strip.html.j2", note, {"legend": [*legend, ("condition of the estimate", GREY)]}

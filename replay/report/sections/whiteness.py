@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.outcome import Verdict
 from axialnav.replay.report.figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, Figure, numbers
+from axialnav.replay.report.nis import nis_histograms
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
 from axialnav.replay.series import autocorrelation
@@ -27,8 +28,12 @@ def build(run: Run) -> Section | None:
     fused = {name: values for name in run.log.sensors if (values := _normalised(run, name)).size}
     if not fused:
         return None
-    note = "Fused innovations divided by their predicted sigma, first axis of each sensor."
-    return Section("Are the innovations honest?", [_distribution(fused), _memory(fused)], note=note)
+    note = (
+        "NIS is the squared innovation over its predicted variance, all axes together. The lower two plots take the "
+        "fused innovations of each sensor's first axis."
+    )
+    figures = [*nis_histograms(run.log), _distribution(fused), _memory(fused)]
+    return Section("Are the innovations honest?", figures, note=note)
 
 
 def _normalised(run: Run, name: str) -> Array:
@@ -61,7 +66,8 @@ def _memory(fused: dict[str, Array]) -> Figure:
         traces.append(_line(lags[: found.size], found, name, colour, shape="linear", mode="lines+markers"))
     fewest = min(values.size for values in fused.values())
     caption = (
-        f"White noise stays near 0: within {2.0 / math.sqrt(fewest):.2f} even for the sensor with fewest readings."
+        "Correlation of innovations with those that many readings later. White noise stays near 0: within "
+        f"{2.0 / math.sqrt(fewest):.2f} even for the sensor with fewest readings."
     )
     layout = {"yaxis": {"range": [-1.0, 1.0]}}
     return Figure(traces, "autocorrelation", caption, x_title="lag [readings]", layout=layout)

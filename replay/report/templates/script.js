@@ -26,12 +26,32 @@ function themed(layout) {
 
 // An explicit list: the default one holds buttons that talk to a server.
 const buttons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
-const bar = narrow.matches ? false : "hover";
+const bar = narrow.matches ? true : "hover";
 const options = { responsive: true, displaylogo: false, displayModeBar: bar, modeBarButtons: buttons };
+
+// Plots over time share one range: a zoom in one shows the same seconds in all.
+let shared = null;
 
 function draw(element) {
   const figure = figures[Number(element.dataset.figure)];
-  return Plotly.react(element, figure.traces, themed(figure.layout), options);
+  const layout = themed(figure.layout);
+  if (figure.time && shared) layout.xaxis = { ...layout.xaxis, range: [...shared] };
+  const first = !element.data;
+  const drawn = Plotly.react(element, figure.traces, layout, options);
+  if (first && figure.time) element.on("plotly_relayout", (change) => share(element, change));
+  return drawn;
+}
+
+function share(source, change) {
+  if (!Object.keys(change).some((key) => key.startsWith("xaxis."))) return;
+  const range = source.layout.xaxis.range.map(Number);
+  if (shared && range[0] === shared[0] && range[1] === shared[1]) return;
+  shared = range;
+  for (const element of plots) {
+    if (element !== source && element.data && figures[Number(element.dataset.figure)].time) {
+      Plotly.relayout(element, { "xaxis.range": [...range] });
+    }
+  }
 }
 
 const plots = Array.from(document.querySelectorAll(".plot"));
