@@ -19,6 +19,7 @@ from axialnav.replay.simulate.world import Facet, World
 
 Array = NDArray[np.float64]
 PROBES = (13, 9)  # rays, across and down, that find what is in view
+MOST_PROBES = 300
 MARGIN_PX = 3
 FAR_M = 25.0  # of a wall seen along its length: what is farther is a few px wide
 UPRIGHT = ("left", "right", "end", "niche")
@@ -74,12 +75,13 @@ class CorridorView:
         return sorted({self._group_of[f] for f in hits.facet.tolist() if f >= 0})
 
     def _composed(self, seen: list[int], position: Array, rotation: Array, poses: Poses) -> Image:
-        depths = np.full((len(seen), self._camera.height, self._camera.width), np.inf, dtype=np.float32)
-        for k, number in enumerate(seen):
-            for index in self._group(number).facets:
-                np.minimum(depths[k], self._depth(self._world.facets[index], position, rotation), out=depths[k])
+        depths = self._depths(seen, position, rotation)
+        missed = self._behind(~np.isfinite(depths).any(axis=0), position, rotation)
+        if missed:  # pieces so small that no probe met them
+            seen = [*seen, *missed]
+            depths = np.concatenate([depths, self._depths(missed, position, rotation)])
         nearest = np.argmin(depths, axis=0)
-        dark = ~np.isfinite(np.take_along_axis(depths, nearest[None], axis=0)[0])
+        dark = ~np.isfinite(depths).any(axis=0)
         out = np.zeros(nearest.shape, dtype=np.float32)
         taps = lens_taps(self._camera.lens_sigma_px)
         for k, number in enumerate(seen):
@@ -88,6 +90,22 @@ class CorridorView:
                 mask = cv2.sepFilter2D(mask, cv2.CV_32F, taps, taps, borderType=cv2.BORDER_REPLICATE)
                 self._add(self._group(number), mask, position, rotation, poses, out)
         return out
+
+    def _depths(self, groups: list[int], position: Array, rotation: Array) -> Image:
+        """Depth at which each pixel meets each group [m], infinite where it does not, shape (groups, h, w)."""
+        depths = np.full((len(groups), self._camera.height, self._camera.width), np.inf, dtype=np.float32)
+        for depth, number in zip(depths, groups, strict=True):
+            for index in self._group(number).facets:
+                np.minimum(depth, self._depth(self._world.facets[index], position, rotation), out=depth)
+        return depths
+
+    def _behind(self, pixels: NDArray[np.bool_], position: Array, rotation: Array) -> list[int]:
+        """Groups that some of the marked pixels (h, w) look at."""
+        v, u = np.nonzero(pixels)
+        step = max(1, len(u) // MOST_PROBES)
+        rays = _rays(self._camera, u[::step].astype(np.float64), v[::step].astype(np.float64)) @ rotation.T
+        hits = cast(self._world, np.broadcast_to(position, rays.shape), rays)
+        return sorted({self._group_of[f] for f in hits.facet.tolist() if f >= 0})
 
     def _add(self, group: Group, mask: Image, position: Array, rotation: Array, poses: Poses, out: Image) -> None:
         """Put the part of a group that ``mask`` shows into the picture."""

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, shift
 from scipy.spatial.transform import Rotation
 
+from axialnav.replay.simulate.corridor_view import CorridorView
+from axialnav.replay.simulate.demo import demo_mission
 from axialnav.replay.simulate.flight import GRAVITY_M_S2, fly_mission
 from axialnav.replay.simulate.mission import CameraPlan, Mission, SectionPlan, VehiclePlan, WallLook
 from axialnav.replay.simulate.scenarios import mission_of
@@ -17,6 +19,7 @@ from axialnav.replay.simulate.sensors.camera import CameraOnBoard
 from axialnav.replay.simulate.sensors.imu import ImuSheet, read_imu
 from axialnav.replay.simulate.sensors.uwb import episodes
 from axialnav.replay.simulate.vehicle import Motion
+from axialnav.replay.simulate.walls import Wall
 
 Array = NDArray[np.float64]
 
@@ -144,3 +147,18 @@ def test_reflections_are_long_one_sided_and_come_in_episodes() -> None:
     assert np.quantile(held[reflected], 0.90) < 4.8
     assert lasted.max() <= 8.2
     assert np.quantile(lasted, 0.05) >= 0.15
+
+
+@pytest.mark.parametrize("metres", [5.5, 6.4, 7.6, 11.5, 12.5])
+def test_no_part_of_a_picture_stays_black(metres: float) -> None:
+    """On stairs and in corners small pieces of ceiling and floor come into the picture's corners."""
+    mission = demo_mission()
+    flown = fly_mission(mission, seed=0)
+    t = np.arange(0.0, flown.trajectory.duration_s, 0.02)
+    way = np.linalg.norm(np.diff(flown.trajectory.at(t).position_m, axis=0), axis=1).cumsum()
+    board = CameraOnBoard(mission, flown.world, flown.trajectory, flown.streams)
+    plain = Wall("plain", np.random.default_rng(1).standard_normal((96, 192)).astype(np.float32))
+    board.view = CorridorView(flown.world, board.model, 0.01, lambda _: plain)
+    light = board.light(float(np.interp(metres, way, t[1:])))
+    assert light.min() > 0.05
+    assert light.max() < 2.0
