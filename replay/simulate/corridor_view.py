@@ -76,7 +76,7 @@ class CorridorView:
 
     def _composed(self, seen: list[int], position: Array, rotation: Array, poses: Poses) -> Image:
         depths = self._depths(seen, position, rotation)
-        missed = self._behind(~np.isfinite(depths).any(axis=0), position, rotation)
+        missed = self._behind(np.asarray(~np.isfinite(depths).any(axis=0)), position, rotation)
         if missed:  # pieces so small that no probe met them
             seen = [*seen, *missed]
             depths = np.concatenate([depths, self._depths(missed, position, rotation)])
