@@ -22,6 +22,8 @@ from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.recording import FlightRecording
 from axialnav.fusion.live.warm_up import warm_up
 from axialnav.fusion.strict_toml import dump
+from axialnav.replay.flight import load_flight
+from axialnav.replay.run import replay
 from tests.fusion.live.contract import ContractPx4
 from tests.fusion.live.streamed import (
     Air,
@@ -82,7 +84,9 @@ def test_a_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounted(tmp_p
     assert sent.min() >= 20_000
     clean = rms(clean_axial_errors(flight, SCENE, 0.5, 3.0, 7.8))
     assert rms(streamed.axial_errors(3.0, 7.8)) < SCATTER * clean
-    recorded_is_what_was_pushed(next((tmp_path / "flights").glob("*.mcap")), status)
+    (path,) = (tmp_path / "flights").glob("*.mcap")
+    recorded_is_what_was_pushed(path, status)
+    the_recording_replays_to_the_last_bit(path, node)
 
 
 def account_for_every_message(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
@@ -128,6 +132,16 @@ def recorded_is_what_was_pushed(path: Path, status: dict[str, Any]) -> None:
         assert topics[f"/{sensor}"] == sum(verdicts.values())
     assert topics["/wire/mavlink_in"] > 1000
     assert topics["/state"] > 100
+
+
+def the_recording_replays_to_the_last_bit(path: Path, node: Node) -> None:
+    """Late, damaged and lost as it was, what was flown is what the replay of its recording gives."""
+    snapshot = node.core.snapshot(0)
+    assert snapshot is not None
+    track = replay(load_flight(path)).track
+    assert track.t_ns[-1] == snapshot.state.t_ns
+    assert track.velocity_m_s[-1].tobytes() == snapshot.state.velocity_m_s.tobytes()
+    assert track.position_m[-1].tobytes() == snapshot.state.position_m.tobytes()
 
 
 @pytest.mark.slow
