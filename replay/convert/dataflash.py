@@ -12,7 +12,7 @@ import numpy as np
 from axialnav.fusion.errors import FlightError
 from axialnav.fusion.sources import fused_sensors
 from axialnav.models.rig import AttitudeSource, Camera, Imu, RangeFinder
-from axialnav.replay.convert.exact import ROW_MESSAGE, TEXT_MESSAGE, exact_rows, exact_text, text_pieces
+from axialnav.replay.convert.exact import ROW, ROW_MESSAGE, TEXT_MESSAGE, exact_rows, exact_text, row_sum, text_pieces
 from axialnav.replay.flight import Flight
 
 HEAD = b"\xa3\x95"
@@ -25,7 +25,7 @@ FORMATS = (
     (0x82, "ATT", "Qccc", "TimeUS,Roll,Pitch,Yaw"),
     (0x83, "RFND", "QBfB", "TimeUS,Instance,Dist,Orient"),
     (0x90, TEXT_MESSAGE, "QHHBZ", "TimeUS,N,Of,L,T"),
-    (0x91, ROW_MESSAGE, "QBqdddddddd", "TimeUS,S,TNs,V0,V1,V2,V3,V4,V5,V6,V7"),
+    (0x91, ROW_MESSAGE, "QBqddddddddH", "TimeUS,S,TNs,V0,V1,V2,V3,V4,V5,V6,V7,Sum"),
 )
 _CODES = {"Q": "Q", "B": "B", "H": "H", "q": "q", "d": "d", "f": "f", "c": "h", "n": "4s", "N": "16s", "Z": "64s"}
 PACKERS = {
@@ -60,7 +60,7 @@ def _messages(flight: Flight) -> Iterator[bytes]:
     for number, name, letters, labels in FORMATS:
         length = 3 + PACKERS[name][1].size
         yield _pack("FMT", number, length, name.encode(), letters.encode(), labels.encode())
-    for number, count, piece in text_pieces(exact_text(flight), PIECE_BYTES):
+    for number, count, piece in list(text_pieces(exact_text(flight), PIECE_BYTES)) * 2:  # as in a .tlog
         yield _pack(TEXT_MESSAGE, 0, number, count, len(piece), piece)
     rows = exact_rows(flight)
     start_ns = int(rows["t_ns"][0]) if len(rows) else 0
@@ -79,4 +79,4 @@ def _messages(flight: Flight) -> Iterator[bytes]:
             yield _pack("ATT", stamp_us, *(int(a) if a < 32768 else int(a) - 36000 for a in np.rint(angles).tolist()))
         elif isinstance(of_row, RangeFinder):
             yield _pack("RFND", stamp_us, 0, values[0], 25)
-        yield _pack(ROW_MESSAGE, stamp_us, source, t_ns, *values)
+        yield _pack(ROW_MESSAGE, stamp_us, source, t_ns, *values, row_sum(ROW.pack(source, t_ns, *values)))

@@ -59,8 +59,10 @@ def _records(flight: Flight) -> Iterator[bytes]:
         arrival_us = base_us + (t_ns if not base_us else t_ns - start_ns) // 1000
         return struct.pack(">Q", arrival_us) + packet
 
-    for number, count, piece in text_pieces(exact_text(flight), PIECE_BYTES):
-        yield record(start_ns, _tunnel(TEXT_TYPE, TEXT_HEAD.pack(number, count) + piece))
+    pieces = [TEXT_HEAD.pack(n, count) + piece for n, count, piece in text_pieces(exact_text(flight), PIECE_BYTES)]
+    for _ in range(2):  # twice, because a packet may be damaged and nothing can be read without the description
+        for piece in pieces:
+            yield record(start_ns, _tunnel(TEXT_TYPE, piece))
     packers = _packers(flight, start_ns)
     for source, t_ns, values in rows.tolist():
         if source in packers:

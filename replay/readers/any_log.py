@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 from axialnav.fusion.errors import FlightError
@@ -19,11 +20,24 @@ def read_log(path: Path, mapping: Path | None = None) -> Flight:
         One line: what cannot be used, why, and the way out.
     """
     try:
-        return _read(path, detect(path), mapping)
+        form = detect(path)
+        if form is Format.FOLDER:
+            return _read(path, form, mapping)
+        return _read_binary(path, form, mapping)
     except FlightError as error:
-        raise FlightError(one_line(str(error))) from None
+        raise FlightError(one_line(str(error))) from error.__cause__
     except OSError as error:
         raise FlightError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
+def _read_binary(path: Path, form: Format, mapping: Path | None) -> Flight:
+    """Read a binary log; one whose lengths, counts or texts contradict each other is damaged."""
+    try:
+        return _read(path, form, mapping)
+    except (struct.error, LookupError, ValueError, OverflowError) as error:
+        raise FlightError(
+            f"{path}: damaged {form.value}: {type(error).__name__}: {error}; copy the log again"
+        ) from error
 
 
 def _read(path: Path, form: Format, mapping: Path | None) -> Flight:

@@ -93,13 +93,19 @@ class _Reader:
         for opcode, start, end in self._records(self._data, len(MAGIC)):
             if opcode == DATA_END:
                 return
-            if opcode == CHUNK:
-                self._chunk(start, end)
-            elif opcode == METADATA:
-                self._metadata(self._data[start:end])
-            else:
-                self._record(opcode, self._data, start, end, None)
+            try:
+                self._top_record(opcode, start, end)
+            except struct.error:
+                self.log.damage = f"the record at byte {start} is damaged and left out"
         self.log.damage = self.log.damage or f"the file ends at byte {len(self._data)} without its summary: it was cut"
+
+    def _top_record(self, opcode: int, start: int, end: int) -> None:
+        if opcode == CHUNK:
+            self._chunk(start, end)
+        elif opcode == METADATA:
+            self._metadata(self._data[start:end])
+        else:
+            self._record(opcode, self._data, start, end, None)
 
     def _records(self, data: memoryview, at: int) -> Iterator[tuple[int, int, int]]:
         """Operation, beginning and end of each record; of a cut one only if it is a chunk."""

@@ -41,6 +41,11 @@ def read_ulog(path: Path, mapping: Path | None) -> Flight:
         drops.add(path.name, "the file is damaged; what could be read was", 1, said.getvalue().strip() or path.name)
     streams = []
     for data in log.data_list:
+        if "timestamp" not in data.data:
+            drops.add(
+                data.name, "topic without timestamps: left out", len(next(iter(data.data.values()), ())), data.name
+            )
+            continue
         name = data.name if data.multi_id == 0 else f"{data.name}[{data.multi_id}]"
         columns = {field: np.asarray(values) for field, values in data.data.items()}
         streams.append(Stream(name, data.name, columns["timestamp"].astype(np.int64) * 1000, columns))
