@@ -30,6 +30,7 @@ from axialnav.fusion.kernels.propagate import rotate_sample
 from axialnav.fusion.kernels.reanchor import observe_source, reanchor
 from axialnav.fusion.kernels.run import note_arrival
 from axialnav.fusion.kernels.update import MIN_WEIGHT, is_uwb, redescend
+from axialnav.fusion.kernels.window import note_motion
 from axialnav.fusion.memory import (
     LOG_CODE,
     LOG_GATE,
@@ -205,6 +206,7 @@ class AxialFilter:
     def _predict(self, core: Any, dt: float, accel_m_s2: float, noise: float) -> None:
         """All states over ``dt``, the four of them by filterpy."""
         x, tune, ekf = core["x"][0], self.config.axial, self._ekf
+        note_motion(int(core["t_imu"]), core["imu"][:3], dt, accel_m_s2 * dt * self.held.axis, core)
         ekf.x = self.held.states(x)
         ekf.P, S = self.held.split(core["P"][0])
         keep = math.exp(-dt / tune.tilt_time_s)

@@ -29,7 +29,7 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
 from axialnav.fusion.packing import Packer
-from axialnav.fusion.readings import CameraFrame, ImuSample, Reading
+from axialnav.fusion.readings import BlurLength, CameraFrame, ImuSample, PixelMotion, Reading
 from axialnav.fusion.sources import Kind, Records, build_sources
 from axialnav.fusion.stream import HELD, TOO_OLD, CompiledStream, Stream
 from axialnav.models.state import (
@@ -114,7 +114,10 @@ class CorridorEstimator:
         source, values = self._packer.pack(reading)
         if not self._enabled[source]:
             return self._record(reading, Reason.DISABLED)
-        code = self._stream.push(reading.t_ns, source, values)
+        t_ns = reading.t_ns
+        if isinstance(reading, PixelMotion | BlurLength):
+            t_ns += round(0.5e9 * reading.window_s)  # as in events.after_stamp_ns
+        code = self._stream.push(t_ns, source, values)
         if code == TOO_OLD:
             self.late[reading.sensor] += 1
             return self._record(reading, Reason.TOO_OLD)

@@ -83,15 +83,26 @@ def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
         table = tables[name]
         kind = kind_of(config.sensor[name])
         assert kind is not None
-        stamps.append(np.asarray(table.t_ns, dtype=np.int64))
+        packed = _pack_columns(table, COLUMNS[kind])
+        stamps.append(np.asarray(table.t_ns, dtype=np.int64) + after_stamp_ns(kind, packed[:, 0]))
         sources.append(np.full(len(table.t_ns), index, dtype=np.int64))
-        values.append(_pack_columns(table, COLUMNS[kind]))
+        values.append(packed)
     if not stamps:
         return Events(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, WIDTH)))
     t_ns, source, value = np.concatenate(stamps), np.concatenate(sources), np.concatenate(values)
     ties = tie_break(value.T)
     order = np.lexsort((*reversed(ties), source, t_ns))
     return Events(t_ns[order], source[order], np.ascontiguousarray(value[order]))
+
+
+def after_stamp_ns(kind: Kind, first_value: NDArray[np.float64]) -> NDArray[np.int64]:
+    """How long after its stamp a reading is processed [ns], by its first value.
+
+    Pixel motion is stamped in the middle of its window, but only known at its end; everything else, at once.
+    """
+    if kind not in {Kind.FLOW, Kind.BLUR}:
+        return np.zeros(first_value.shape, dtype=np.int64)
+    return np.round(0.5e9 * first_value).astype(np.int64)
 
 
 def _pack_columns(table: Table, names: tuple[str, ...]) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from axialnav.models.state import N_BIASES, N_ERROR, N_NOMINAL
 
 Array = NDArray[np.float64]
 Records = NDArray[np.void]
+REMEMBERED: Final = 64  # instants
 LONG_AGO: Final = np.iinfo(np.int64).min // 4
 
 MEMORY: Final = np.dtype(
@@ -38,6 +39,11 @@ MEMORY: Final = np.dtype(
         ("t_trial", "i8"),
         ("good_trials", "i8"),
         ("evidence", "f8"),  # log-likelihood of the rival minus that of the estimate
+        # integrals of rate and acceleration since the start, and their values at instants of the past
+        ("motion", "f8", 6),
+        ("kept_motion", "f8", (REMEMBERED, 6)),
+        ("kept_t", "i8", REMEMBERED),
+        ("kept", "i8"),
         # UWB paths that have a bias state: which, when last heard, stationary variance [m^2]
         ("path", "i8", N_BIASES),
         ("path_heard", "i8", N_BIASES),
@@ -70,6 +76,8 @@ SCRATCH: Final = np.dtype(
         ("y", "f8", 3), ("PHt", "f8", N_ERROR), ("gain", "f8", N_ERROR), ("step", "f8", N_ERROR), ("R", "f8", (3, 3)),
         ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 8), ("p", "f8", 3), ("mean_imu", "f8", 6),
         ("focal_window", "f8", 2), ("row", "f8", 10), ("repeated", "f8"), ("normal", "f8", 3), ("plane", "f8", 2),
+        ("x", "f8", N_NOMINAL), ("rate", "f8", 3), ("gained", "f8", 3), ("first", "f8", 6), ("mid", "f8", 6),
+        ("last", "f8", 6),
     ],
     align=True,
 )  # fmt: skip

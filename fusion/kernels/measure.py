@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.paths import place_of
+from axialnav.fusion.kernels.window import state_in_window
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
@@ -54,9 +55,9 @@ def measure(
     if kind == UWB_RANGE:
         return _measure_uwb_range(t_ns, s, seen, values, x, m, w, c)
     if kind == FLOW:
-        return _measure_flow(s, values, x, m, w)
+        return _measure_flow(t_ns, s, values, x, m, w)
     if kind == BLUR:
-        return _measure_blur(s, values, x, P, m, w)
+        return _measure_blur(t_ns, s, values, x, P, m, w)
     if kind == RANGE:
         return _measure_range(s, values, x, w)
     if kind == UWB_POSITION:
@@ -179,35 +180,37 @@ def _measure_fix(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m:
 
 
 @kernel
-def _pixel_motion(s: Record, window_s: float, axis: Integer, x: Array, m: Record, w: Record) -> float:
+def _pixel_motion(s: Record, window_s: float, axis: Integer, w: Record) -> float:
     for i in range(2):
         w.focal_window[i] = s.focal_px[i] * window_s
-    if not _look_at_surface(s, x, w):
+    if not _look_at_surface(s, w.x, w):
         return np.nan
     return pixel_motion(
-        x, w.p, w.R, m.imu[0:3], s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state,
+        w.x, w.p, w.R, w.rate, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state,
         w.focal_window, axis, w.H[axis], w.ray,
     )  # fmt: skip
 
 
 @kernel
-def _measure_flow(s: Record, values: Array, x: Array, m: Record, w: Record) -> int:
+def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, m: Record, w: Record) -> int:
     if values[4] < s.low:
         return -WEAK_SIGNAL
     if not np.isfinite(values[1]):
         return -NO_MOTION
     axes = 2 if np.isfinite(values[2]) else 1
+    state_in_window(t_ns, values[0], x, m, w)
     for i in range(axes):
         w.z[i] = values[1 + i]
-        w.h[i] = _pixel_motion(s, values[0], i, x, m, w)
+        w.h[i] = _pixel_motion(s, values[0], i, w)
         w.variance[i] = values[3] ** 2 if np.isfinite(values[3]) else s.sigma**2
     return axes if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
 @kernel
-def _measure_blur(s: Record, values: Array, x: Array, P: Array, m: Record, w: Record) -> int:
+def _measure_blur(t_ns: int, s: Record, values: Array, x: Array, P: Array, m: Record, w: Record) -> int:
     """Unsigned length: usable only while the direction of motion is known and the blur is long enough to see."""
-    signed = _pixel_motion(s, values[0], np.int64(0), x, m, w)  # a literal 0 would compile the model once more
+    state_in_window(t_ns, values[0], x, m, w)
+    signed = _pixel_motion(s, values[0], np.int64(0), w)  # a literal 0 would compile the model once more
     if not np.isfinite(signed):
         return -NO_GEOMETRY
     spread = 0.0

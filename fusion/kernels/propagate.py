@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import predict_covariance
+from axialnav.fusion.kernels.window import note_motion
 from axialnav.models.imu import strapdown
 from axialnav.models.jit import Record, kernel
 from axialnav.models.state import (
@@ -92,8 +93,13 @@ def propagate(t_ns: int, values: Array, R_BS: Array, m: Record, w: Record, c: Re
     rotate_sample(values, R_BS, m.imu)
     for i in range(6):
         w.mean_imu[i] = 0.5 * (w.mean_imu[i] + m.imu[i])
+    for k in range(3):
+        w.gained[k] = m.x[0, VEL + k]
     for row in range(1 + m.on_trial):
         # the rival believes the opposite of the estimate
         propagate_filter(row, (m.imu_fault == 1) == (row == 0), dt, m, w, c)
+    for k in range(3):
+        w.gained[k] = m.x[0, VEL + k] - w.gained[k]
+    note_motion(t_ns, w.mean_imu[0:3], dt, w.gained, m)
     m.t_imu = t_ns
     return float(dt)

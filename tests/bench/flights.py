@@ -53,16 +53,16 @@ METAL, SICK, SICK_FAST = "util_nlos_tdoa2_circle_metal", "util_los_tdoa2_circle"
 LOST_M = 2.0  # the circles have a radius of about 1 m: farther off, the estimate is of no use
 
 CASES = (
-    Case(OBSTACLES, axial_m_s=0.06, axis_m=0.07),
-    Case(BOLT, axial_m_s=0.06, axis_m=0.06, consistent=True),
+    Case(OBSTACLES, axial_m_s=0.05, axis_m=0.07),
+    Case(BOLT, axial_m_s=0.05, axis_m=0.06, consistent=True),
     Case(OBSTACLES, ("uwb0",), axial_m_s=0.13),
     Case(BOLT, ("uwb0",), axial_m_s=0.13),
-    Case("util_base_tdoa2_circle_noobs", axial_m_s=0.12, axis_m=0.15),
-    Case("util_nlos_tdoa2_circle_wood", axial_m_s=0.12, axis_m=0.15),
-    Case(METAL, axial_m_s=0.20, axis_m=0.40, farthest_m=LOST_M),
-    Case(SICK, axial_m_s=0.30, axis_m=0.30, farthest_m=LOST_M),
+    Case("util_base_tdoa2_circle_noobs", axial_m_s=0.10, axis_m=0.15),
+    Case("util_nlos_tdoa2_circle_wood", axial_m_s=0.10, axis_m=0.15),
+    Case(METAL, axial_m_s=0.15, axis_m=0.30, farthest_m=LOST_M),
+    Case(SICK, axial_m_s=0.20, axis_m=0.30, farthest_m=LOST_M),
     Case(SICK_FAST, axial_m_s=0.30, axis_m=0.35),
-    Case("isas_walk1", position_m=0.22),
+    Case("isas_walk1", position_m=0.17),
     Case("copter_px4flow_gps", speed_m_s=0.5),
 )
 
@@ -73,7 +73,8 @@ GATED = ("uwb", "flow", "range", "height", "attitude")
 DEFAULT: dict[str, str] = {}
 NO_RIVAL = {"imu_fault.enabled": "false"}
 HARD_GATE = {f"{source}.gate.soft_sigma": NEVER for source in GATED}
-WHITE_UWB = {"uwb.correlation_time_s": "0.0"}
+NO_BIASES = {"uwb.bias_sigma_m": "0.0", "uwb.sigma_m": "0.15"}
+WHITE_UWB = {**NO_BIASES, "uwb.correlation_time_s": "0.0"}
 NO_REANCHOR = {"supervisor.reanchor_aided_s": NEVER, "supervisor.reanchor_alone_s": NEVER}
 RIGHT_HANDED = {"handedness": '"right"'}
 PLAIN = {
@@ -89,6 +90,7 @@ VARIANTS: dict[str, dict[str, str]] = {
     "default": DEFAULT,
     "no rival": NO_RIVAL,
     "hard gate": HARD_GATE,
+    "no bias states": NO_BIASES,
     "white UWB noise": WHITE_UWB,
     "no re-anchoring": NO_REANCHOR,
     "right-handed": RIGHT_HANDED,

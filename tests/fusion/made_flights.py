@@ -267,8 +267,8 @@ def describe(name: str, scene: Scene) -> AnySensor:
     """Rig of a simulated sensor, noise as simulated."""
     anchors = dict(scene.anchors)
     down = transform(DOWN_BS)
-    # the filter takes the rotation out with one noisy sample of the gyro
-    flow_sigma = float(np.hypot(SIGMA["flow"], FOCAL_PX * WINDOW_S * GYRO_DENSITY * np.sqrt(scene.imu_rate_hz)))
+    # the filter takes the rotation out with the gyro's mean over the window
+    flow_sigma = float(np.hypot(SIGMA["flow"], FOCAL_PX * GYRO_DENSITY * np.sqrt(WINDOW_S)))
     specs: dict[str, AnySensor] = {
         "imu": Imu(
             gyro_noise_density=GYRO_DENSITY,
