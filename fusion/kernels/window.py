@@ -37,7 +37,7 @@ def note_motion(t_ns: int, rate: Array, dt: float, gained: Array, m: Record) -> 
 
 
 @kernel
-def motion_at(t_ns: int, m: Record, out: Array) -> bool:
+def motion_at(t_ns: Integer, m: Record, out: Array) -> bool:
     """Write both integrals (6,) at ``t_ns`` into ``out``; False where the memory does not reach back so far."""
     if t_ns >= m.t_imu:
         for k in range(3):
