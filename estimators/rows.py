@@ -99,7 +99,7 @@ def _multiply(line: Plane, window: Plane, out: Plane) -> None:
         out[c] = line[c] * window[c]
 
 
-def tukey(length: int, share: float = 0.06) -> Plane:
+def tukey(length: int, share: float = 0.1) -> Plane:
     """Window (length,) with cosine flanks over ``share`` of it."""
     flank = int(share * (length - 1) / 2)
     window = np.ones(length, dtype=np.float32)
