@@ -74,11 +74,14 @@ class ImuTuning(_Table, frozen=True, kw_only=True):
     """How far the inertial unit is trusted beyond its data sheet.
 
     Vibration and sampling make the noise in flight larger than at rest: ``accel_noise_scale`` and
-    ``gyro_noise_scale`` multiply the sensor's densities.
+    ``gyro_noise_scale`` multiply the sensor's densities, ``accel_walk_scale`` and ``gyro_walk_scale`` the walks of its
+    biases.
     """
 
     accel_noise_scale: Positive = 2.0
     gyro_noise_scale: Positive = 1.5
+    accel_walk_scale: Positive = 1.0
+    gyro_walk_scale: Positive = 1.0
 
 
 class StartTuning(_Table, frozen=True, kw_only=True):
@@ -220,9 +223,14 @@ class AxialTuning(_Table, frozen=True, kw_only=True):
 
 
 class DelayTuning(_Table, frozen=True, kw_only=True):
-    """How late a reading may come and still be fused at its own stamp."""
+    """How late a reading may come and still be fused at its own stamp, and stamps that are wrong.
+
+    ``late_s`` names sensors whose stamps are later than the instant they measured, and by how much; what they read is
+    taken as of that much earlier.
+    """
 
     buffer_s: Annotated[float, msgspec.Meta(gt=0.0, le=10.0)] = 1.0
+    late_s: dict[str, Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]] = {}
 
 
 class SupervisorTuning(_Table, frozen=True, kw_only=True):

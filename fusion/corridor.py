@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +12,7 @@ from axialnav.fusion.alignment import align
 from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import AxialnavError, ConfigError
-from axialnav.fusion.events import Events
+from axialnav.fusion.events import Events, late_ns
 from axialnav.fusion.kernels.propagate import propagate_filter
 from axialnav.fusion.kernels.run import health
 from axialnav.fusion.kernels.update import MIN_WEIGHT
@@ -87,6 +88,7 @@ class CorridorEstimator:
             )
         self._packer = Packer(self.config)
         self._cameras = CameraFeed(self.config)
+        self._late_ns = late_ns(self.config)
         self._sources = build_sources(self.config)
         # a plain list: indexing records would cost more than the filter itself
         self._enabled: list[bool] = self._sources["enabled"].tolist()
@@ -111,6 +113,8 @@ class CorridorEstimator:
         if isinstance(reading, CameraFrame):
             motion = self._cameras.push(reading)
             return self.push(motion) if motion is not None else self._record(reading, Reason.NO_MOTION)
+        if reading.sensor in self._late_ns:
+            reading = msgspec.structs.replace(reading, t_ns=reading.t_ns - self._late_ns[reading.sensor])
         source, values = self._packer.pack(reading)
         if not self._enabled[source]:
             return self._record(reading, Reason.DISABLED)

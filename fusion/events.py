@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config
+from axialnav.fusion.errors import ConfigError
 from axialnav.fusion.sources import Kind, fused_sensors, kind_of
 
 WIDTH = 8
@@ -74,9 +75,24 @@ def tie_break(values: NDArray[np.float64]) -> tuple[Any, ...]:
     return tuple(np.where(np.isnan(values), np.inf, values))
 
 
+def late_ns(config: Config) -> dict[str, int]:
+    """By how much the stamps of the named sensors are too late [ns].
+
+    Raises
+    ------
+    ConfigError
+        A name that no sensor has.
+    """
+    unknown = [name for name in config.delay.late_s if name not in config.sensor]
+    if unknown:
+        there = ", ".join(config.sensor) or "none"
+        raise ConfigError(f"delay.late_s names {', '.join(unknown)}, which no sensor is called; there are {there}")
+    return {name: round(late_s * 1e9) for name, late_s in config.delay.late_s.items()}
+
+
 def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
     """Merge the tables of all fused sensors into one batch, sorted by stamp, then source, then value."""
-    stamps, sources, values = [], [], []
+    stamps, sources, values, late = [], [], [], late_ns(config)
     for index, name in enumerate(fused_sensors(config)):
         if name not in tables:
             continue
@@ -84,7 +100,8 @@ def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
         kind = kind_of(config.sensor[name])
         assert kind is not None
         packed = _pack_columns(table, COLUMNS[kind])
-        stamps.append(np.asarray(table.t_ns, dtype=np.int64) + after_stamp_ns(kind, packed[:, 0]))
+        measured = np.asarray(table.t_ns, dtype=np.int64) - late.get(name, 0)
+        stamps.append(measured + after_stamp_ns(kind, packed[:, 0]))
         sources.append(np.full(len(table.t_ns), index, dtype=np.int64))
         values.append(packed)
     if not stamps:

@@ -54,7 +54,19 @@ class _PackageCacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
 def kernel(function: F) -> F:
     """Compile ``function`` to machine code at first use and keep the result on disk until any source changes."""
-    compiled: Any = numba.njit(cache=True, error_model="numpy")(function)
+    return _compiled(function, nogil=False)
+
+
+def threaded_kernel(function: F) -> F:
+    """As :func:`kernel`, for long work: other threads of the process run meanwhile.
+
+    Not for flight: a thread that gives its turn away may wait milliseconds to get it back.
+    """
+    return _compiled(function, nogil=True)
+
+
+def _compiled(function: F, *, nogil: bool) -> F:
+    compiled: Any = numba.njit(cache=True, error_model="numpy", nogil=nogil)(function)
     cache = getattr(compiled, "_cache", None)  # there is none with NUMBA_DISABLE_JIT=1
     if cache is not None:
         cache._cache_file = _PackageCacheFile(cache._cache_path, cache._impl.filename_base)

@@ -19,12 +19,15 @@ from cyclopts.exceptions import CycloptsError
 
 from axialnav.fusion.complaints import INTERRUPTED, PASSED, USAGE, complain, explain, shows_tracebacks
 from axialnav.fusion.live import cli as on_board
+from axialnav.replay.cli_calibrate import allan, calibrate
 from axialnav.replay.cli_check import check, compare
 from axialnav.replay.cli_convert import convert
 from axialnav.replay.cli_doctor import doctor
 from axialnav.replay.cli_output import emit
 from axialnav.replay.cli_replay import demo, replay
 from axialnav.replay.cli_simulate import simulate
+from axialnav.replay.cli_sweep import sweep
+from axialnav.replay.cli_tune import tune
 from axialnav.replay.motion_cli import motion_command
 
 VERBS: dict[str, Callable[..., int]] = {
@@ -36,6 +39,10 @@ VERBS: dict[str, Callable[..., int]] = {
     "check": check,
     "compare": compare,
     "convert": convert,
+    "tune": tune,
+    "calibrate": calibrate,
+    "allan": allan,
+    "sweep": sweep,
 }
 HELP = """Axial velocity of a UAV in a featureless tunnel, with an honest uncertainty.
 

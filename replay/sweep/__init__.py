@@ -1,0 +1,1 @@
+"""Many recordings times many settings, on this machine or on a cluster."""

@@ -1,0 +1,1 @@
+"""Noise parameters, delays and lever arms from the likelihood of the innovations."""
