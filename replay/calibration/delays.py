@@ -15,7 +15,7 @@ COARSE_S = np.arange(-0.5, 0.5001, 0.1)
 FINE_STEPS_S = (0.04, 0.016, 0.006, 0.003)
 MIN_READINGS = 50
 CLEAR_RISE = 4.0  # two standard errors
-MIN_GAIN_NATS = 5.0
+MIN_GAIN_NATS = 20.0  # less than that is the roughness of gates, and of image windows that are not points
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ def find_delays(subject: Subject, workers: int) -> list[Delay]:
             break
         moved = _with_delay(moved, best)
     for name in names:
-        moved = _with_delay(moved, find_delay(moved, name, workers))
+        if moved.config.delay.late_s.get(name) != subject.config.delay.late_s.get(name):
+            moved = _with_delay(moved, find_delay(moved, name, workers, coarse=False))
     final = [find_delay(moved, name, workers, coarse=False) for name in names]
     gains = {name: _gain(subject, moved, name) for name in names}
     return [replace(d, gain_nats=gains[d.sensor], at_edge=abs(d.late_s) > float(COARSE_S[-1])) for d in final]

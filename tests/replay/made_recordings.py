@@ -12,6 +12,14 @@ from axialnav.models.rig import Imu
 from axialnav.replay.flight import Flight, SensorTable, Truth
 from tests.fusion.made_flights import ANCHORS, MadeFlight, Scene, Table, fly, stamps
 
+# noise told as it is: white UWB, no margin on the inertial unit
+PLAIN = {
+    "uwb.sigma_m": "0.01",
+    "uwb.bias_sigma_m": "0.0",
+    "uwb.correlation_time_s": "0.0",
+    "imu.accel_noise_scale": "1.0",
+    "imu.gyro_noise_scale": "1.0",
+}
 SHAKE, WALK = 0.1, 0.02  # in flight: five times the noise, seven times the walk of the bias at rest
 
 
@@ -51,6 +59,6 @@ def flown(seed: int, duration_s: float, *, shake: bool = True, **scene: object) 
         Scene(seed=seed, duration_s=duration_s, sensors=("range0", "flow0", "uwb0"), uwb_rate_hz=20.0, **scene)  # type: ignore[arg-type]
     )
     flight = recording(shaken(made, seed + 1000) if shake else made)
-    config = flight.config.with_params({"uwb.sigma_m": "0.01", "uwb.correlation_time_s": "0.0"})
+    config = flight.config.with_params(PLAIN)
     assert isinstance(config.initial, Initial)
     return Flight(flight.name, flight.path, {}, config, flight.tables, flight.truth, evaluation=flight.evaluation)

@@ -9,21 +9,30 @@ import numpy as np
 import pytest
 
 from axialnav.fusion.config import Config
+from axialnav.fusion.rehearsal import Rehearsal
 from axialnav.replay import cli
 from axialnav.replay.calibration.calibrate import Calibration, calibrate, calibrated_config
 from axialnav.replay.calibration.calibrate_table import summary
+from axialnav.replay.calibration.delays import find_delays
 from axialnav.replay.calibration.line import fit_line
 from axialnav.replay.flight import Flight
 from axialnav.replay.flight_writer import write_flight
+from axialnav.replay.tuning.cost import Subject
 from tests.replay.made_recordings import flown
 
 LATE_S, LONG_M, FOCAL = 0.35, 0.03, 1.04
 
 
+def late_uwb(flight: Flight) -> Flight:
+    """UWB stamped 0.35 s late."""
+    uwb = flight.tables["uwb0"]
+    late = dataclasses.replace(uwb, t_ns=uwb.t_ns + round(LATE_S * 1e9))
+    return dataclasses.replace(flight, tables={**flight.tables, "uwb0": late})
+
+
 def wrong(flight: Flight) -> Flight:
-    """UWB stamped late, ranges too long, images as of a longer lens."""
+    """Ranges too long, images as of a longer lens."""
     tables = dict(flight.tables)
-    tables["uwb0"] = dataclasses.replace(tables["uwb0"], t_ns=tables["uwb0"].t_ns + round(LATE_S * 1e9))
     ranges, flow = tables["range0"], tables["flow0"]
     tables["range0"] = dataclasses.replace(ranges, columns={"range_m": ranges.columns["range_m"] + LONG_M})
     scaled = {name: flow.columns[name] * FOCAL for name in ("dx_px", "dy_px")}
@@ -41,16 +50,17 @@ def found(flight: Flight) -> Calibration:
     return calibrate(flight, workers=1)
 
 
-def test_late_stamps_are_found_within_20_ms(found: Calibration) -> None:
-    late = {delay.sensor: delay for delay in found.delays}
+@pytest.mark.slow
+def test_late_stamps_are_found_within_20_ms() -> None:
+    flight = late_uwb(flown(1, 40.0))
+    delays = find_delays(Subject("late", flight.config, Rehearsal(flight.config, flight.tables)), 1)
+    late = {delay.sensor: delay for delay in delays}
     assert late["uwb0"].late_s == pytest.approx(LATE_S, abs=0.02)
     assert late["uwb0"].gain_nats > 100.0
     assert abs(late["flow0"].late_s) < 0.02
-    # the height changes slowly: its delay is known less well, and says so
-    sigma_s = late["range0"].sigma_s
-    assert sigma_s is None or abs(late["range0"].late_s) < 4.0 * sigma_s + 0.02
 
 
+@pytest.mark.slow
 def test_focal_length_and_range_offset_are_found(found: Calibration) -> None:
     (image,), (offset,) = found.images, found.ranges
     assert image.focal_px == pytest.approx(350.0 * FOCAL, abs=4.0 * image.sigma_focal_px)
@@ -60,10 +70,10 @@ def test_focal_length_and_range_offset_are_found(found: Calibration) -> None:
     assert image.paper.slope == pytest.approx(image.expected_slope, rel=0.25)
 
 
+@pytest.mark.slow
 def test_what_is_written_takes_the_errors_out(flight: Flight, found: Calibration) -> None:
     config = Config.from_dict(calibrated_config(None, flight, found))
     again = calibrate(flight, config, workers=1)
-    assert abs(again.delays[-1].late_s - LATE_S) < 0.02
     assert again.images[0].scale.slope == pytest.approx(1.0, abs=0.015)
     assert abs(again.ranges[0].offset_m) < 0.002
     text = summary([found, again])
@@ -94,10 +104,10 @@ def test_a_line_needs_points_that_differ() -> None:
 
 
 def test_the_verb_writes_a_file_for_replay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = write_flight(flown(2, 8.0), tmp_path / "flight")
+    folder = write_flight(flown(2, 12.0), tmp_path / "flight")
     out = tmp_path / "calibrated.toml"
     assert cli.main(["calibrate", str(folder), "--out", str(out), "--workers", "1"]) == 0
-    assert "focal length" in capsys.readouterr().out
+    assert "range0: reads" in capsys.readouterr().out
     assert isinstance(Config.from_toml(out), Config)
     assert cli.main(["calibrate"]) == 2
     assert cli.main(["calibrate", str(tmp_path / "none")]) == 3
