@@ -29,10 +29,10 @@ from axialnav.replay.run import Run
 IMAGE_COLOURS = (GREEN, PURPLE)
 DOT = {"size": 3, "opacity": 0.45}
 CROSS = {"size": 5, "opacity": 0.8, "symbol": "x"}
-CAPTION = (
-    "Shaded: 3 sigma as the filter states it. Dots: the velocity that each reading of the image motion asks for at the "
-    "calibrated scale, with the filter's distance and attitude; crosses were refused by the gate. The line breaks "
-    "where the IMU was silent."
+CAPTION = "Shaded: 3 sigma as the filter states it. The line breaks where the IMU was silent."
+IMAGE_CAPTION = (
+    " Dots: the velocity that each reading of the image motion asks for at the calibrated scale, with the filter's "
+    "distance and attitude; crosses were refused by the gate."
 )
 
 
@@ -63,9 +63,10 @@ def _velocity(run: Run, motion: RigidMotion) -> Figure:
     axis = axial_frame(run.config.corridor, motion.points(track.position_m)).axis
     velocity = along(axis, motion.vectors(track.velocity_m_s))
     sigma = sigma_along(axis, motion.covariances(track.velocity_covariance))
-    traces = band(seconds, velocity - 3.0 * sigma, velocity + 3.0 * sigma, "3 sigma", BLUE)
+    image = _image(run) if motion is IDENTITY else []
+    traces = [*image]  # first, so that the lines are drawn over the dots
+    traces += band(seconds, velocity - 3.0 * sigma, velocity + 3.0 * sigma, "3 sigma", BLUE)
     traces.append(line(seconds, velocity, "fused", BLUE))
-    traces += _image(run) if motion is IDENTITY else []
     if truth is not None:
         frame = axial_frame(run.config.corridor, truth.position_m)
         true_seconds = (truth.t_ns - track.t_ns[0]) * 1e-9
@@ -73,7 +74,8 @@ def _velocity(run: Run, motion: RigidMotion) -> Figure:
     # a wide band at the start must not flatten the flight
     room = 0.5 + 1.5 * float(np.nanpercentile(np.abs(np.append(velocity, 0.0)), 99.5))
     layout = {"yaxis": {"range": [-room, room]}, **section_marks(run, motion)}
-    return Figure(traces, "axial velocity [m/s]", CAPTION, height_px=400, layout=layout)
+    caption = CAPTION + IMAGE_CAPTION * bool(image)
+    return Figure(traces, "axial velocity [m/s]", caption, height_px=400, layout=layout)
 
 
 def _image(run: Run) -> list[Trace]:

@@ -15,19 +15,24 @@ LIBRARIES = ("axialnav", "numpy", "scipy", "numba")
 
 
 def build(run: Run) -> Section:
-    """Facts as name and value; what the reader refused as a table."""
+    """Facts as name, value and explanation; what the reader refused as a table."""
     info = run.flight.info
     timing = run.metrics["timing"]
+    replayed = f"{timing['flight_s']:.1f} s of flight in {timing['wall_s']:.2f} s"
     facts = [
-        ("flight", run.flight.name),
-        *((key, info[key]) for key in ("source", "licence", "note") if info.get(key)),
-        ("estimator", run.metrics["estimator"]),
-        ("digest of fused.csv", run.metrics["digest"]),
-        ("SHA-256 of the readings", _readings_digest(run)),
-        ("SHA-256 of config.toml", hashlib.sha256(run.config.to_toml().encode()).hexdigest()),
-        ("software", ", ".join(f"{name} {_version(name)}" for name in LIBRARIES)),
-        ("machine", f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"),
-        ("replay", f"{timing['flight_s']:.1f} s of flight in {timing['wall_s']:.2f} s"),
+        ("flight", run.flight.name, ""),
+        *((key, info[key], "") for key in ("source", "licence", "note") if info.get(key)),
+        (
+            "estimator",
+            run.metrics["estimator"],
+            "corridor: all states; axial: the autopilot's attitude and four states",
+        ),
+        ("digest of fused.csv", run.metrics["digest"], "over every number of fused.csv: equal inputs, equal digest"),
+        ("SHA-256 of the readings", _readings_digest(run), "over stamps and values of all sensors as they were read"),
+        ("SHA-256 of config.toml", hashlib.sha256(run.config.to_toml().encode()).hexdigest(), "all settings, resolved"),
+        ("software", ", ".join(f"{name} {_version(name)}" for name in LIBRARIES), ""),
+        ("machine", f"Python {platform.python_version()}, {platform.system()} {platform.machine()}", ""),
+        ("replay", replayed, "recorded time, and time that the replay took, reading excluded"),
     ]
     return Section("Provenance", template="provenance.html.j2", values={"facts": facts, "drops": run.flight.drops})
 

@@ -3,6 +3,9 @@ const figures = JSON.parse(document.getElementById("figures").textContent);
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const narrow = window.matchMedia("(max-width: 600px)");
 
+// Where the screen is narrow the buttons are always there, in a row of their own above the legend.
+const BAR_PX = 28;
+
 function themed(layout) {
   const style = getComputedStyle(document.documentElement);
   const ink = style.getPropertyValue("--ink").trim();
@@ -16,7 +19,7 @@ function themed(layout) {
     font: { family: "system-ui, sans-serif", color: ink, size: narrow.matches ? 11 : 13 },
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
-    margin: { l: 50, r: 10, t: 30, b: 45 },
+    margin: { l: 50, r: 10, t: narrow.matches ? 30 + BAR_PX : 30, b: 45 },
     legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, itemsizing: "constant" },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: soft, activecolor: ink },
     hovermode: "closest",
@@ -35,6 +38,8 @@ let shared = null;
 function draw(element) {
   const figure = figures[Number(element.dataset.figure)];
   const layout = themed(figure.layout);
+  if (narrow.matches) layout.height += BAR_PX;
+  element.style.height = `${layout.height}px`;
   if (figure.time && shared) layout.xaxis = { ...layout.xaxis, range: [...shared] };
   const first = !element.data;
   const drawn = Plotly.react(element, figure.traces, layout, options);
