@@ -23,7 +23,7 @@ from axialnav.replay.report.moments import moments
 from axialnav.replay.report.nis import chi_square_shares
 from axialnav.replay.report.page import render_report
 from axialnav.replay.report.png import png
-from axialnav.replay.report.sections import frames
+from axialnav.replay.report.sections import frames, strip
 from axialnav.replay.run import Run
 from tests.replay.made_runs import make_run
 
@@ -123,6 +123,15 @@ def test_sections_are_told_in_the_order_they_were_flown() -> None:
     assert [name == "stairs_2" for name, _, _ in spans] == (x > 0.0).tolist()
     assert len(section_marks(run)["shapes"]) == len(spans) - 1
     assert section_marks(make_run()) == {}
+
+
+def test_a_time_out_is_a_line_under_its_sensor() -> None:
+    run = make_run()
+    sensors = {**run.metrics["sensors"], "uwb0": {**run.metrics["sensors"]["uwb0"], "timeouts": [[3.0, 4.5]]}}
+    (figure,) = strip.build(replace(run, metrics={**run.metrics, "sensors": sensors})).figures
+    lines = [shape for shape in figure.layout["shapes"] if shape["line"]["color"] == strip.MAGENTA]
+    assert [(line["x0"], line["x1"]) for line in lines] == [(3.0, 4.5)]
+    assert round(lines[0]["y0"]) == figure.traces[0]["y"].index("uwb0")
 
 
 def test_the_verdict_is_that_of_the_default_limits() -> None:

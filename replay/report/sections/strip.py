@@ -24,6 +24,9 @@ COLOURS = {
     Verdict.INVALID: RED,
 }
 CONDITION = len(COLOURS)
+MAGENTA = "#d633b0"
+OTHER_COLOURS = (("condition of the estimate", GREY), ("underlined: time-out", MAGENTA))
+MAX_TIMEOUTS = 100
 
 
 def build(run: Run) -> Section:
@@ -31,20 +34,18 @@ def build(run: Run) -> Section:
     edges = np.linspace(0.0, max((run.track.t_ns[-1] - run.track.t_ns[0]) * 1e-9, 1e-3), BINS + 1)
     rows = [*_sensor_rows(run, edges), *_condition_rows(run, edges)]
     note = (
-        "Colour: what happened to most readings of that moment. White space: no reading. Blind is not a rejection. "
-        "Dotted grey: the next section of the corridor begins."
+        "Colour: what happened to most readings of that moment. White space: no reading. Underlined: not fused for "
+        "longer than its time-out. Blind is not a rejection. Dotted grey: the next section of the corridor begins."
     )
     marks = section_marks(run, inside=False)
     layout = {
         **marks,
-        "shapes": [*marks.get("shapes", ()), *_reset_lines(run)],
+        "shapes": [*marks.get("shapes", ()), *_reset_lines(run), *_timeout_lines(run, [name for name, _, _ in rows])],
         "yaxis": {"autorange": "reversed", "fixedrange": True},
     }
     figure = Figure(_heatmap(rows, edges), "", _resets_caption(run), height_px=110 + 34 * len(rows), layout=layout)
     legend = [(verdict.name.lower(), colour) for verdict, colour in COLOURS.items()]
-    return Section(
-        "Sensors over time", [figure], "strip.html.j2", note, {"legend": [*legend, ("condition of the estimate", GREY)]}
-    )
+    return Section("Sensors over time", [figure], "strip.html.j2", note, {"legend": [*legend, *OTHER_COLOURS]})
 
 
 def _sensor_rows(run: Run, edges: NDArray[np.float64]) -> list[Row]:
@@ -109,6 +110,17 @@ def _reset_lines(run: Run) -> list[dict[str, Any]]:
     style = {"color": RED, "width": 1.5, "dash": "dot"}
     at = _reset_seconds(run)[:50]
     return [{"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": s, "x1": s, "line": style} for s in at]
+
+
+def _timeout_lines(run: Run, names: list[str]) -> list[dict[str, Any]]:
+    """A line under the row of a sensor while it was not fused for longer than its time-out."""
+    style = {"color": MAGENTA, "width": 3}
+    spans = [
+        (place + 0.46, start, end)
+        for place, name in enumerate(names)
+        for start, end in run.metrics["sensors"].get(name, {}).get("timeouts", ())
+    ]
+    return [{"type": "line", "x0": a, "x1": b, "y0": y, "y1": y, "line": style} for y, a, b in spans[:MAX_TIMEOUTS]]
 
 
 def _resets_caption(run: Run) -> str:
