@@ -63,6 +63,15 @@ class CorridorView:
             return np.asarray(posed_light(group.plane, self._camera, poses) * np.float32(group.albedo))
         return self._composed(seen, position, rotation, poses)
 
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """Numbers of all groups of pieces."""
+        return tuple(sorted(set(self._group_of)))
+
+    def plane(self, number: int) -> WallPlane:
+        """Plane and picture of a group."""
+        return self._group(number).plane
+
     def _in_view(self, position: Array, rotation_WS: Array) -> list[int]:
         """Groups that a grid of rays meets."""
         camera = self._camera
@@ -88,7 +97,7 @@ class CorridorView:
             mask = ((nearest == k) & ~dark).astype(np.float32)
             if mask.any():
                 mask = cv2.sepFilter2D(mask, cv2.CV_32F, taps, taps, borderType=cv2.BORDER_REPLICATE)
-                self._add(self._group(number), mask, position, rotation, poses, out)
+                self._add(number, mask, position, rotation, poses, out)
         return out
 
     def _depths(self, groups: list[int], position: Array, rotation: Array) -> Image:
@@ -107,12 +116,26 @@ class CorridorView:
         hits = cast(self._world, np.broadcast_to(position, rays.shape), rays)
         return sorted({self._group_of[f] for f in hits.facet.tolist() if f >= 0})
 
-    def _add(self, group: Group, mask: Image, position: Array, rotation: Array, poses: Poses, out: Image) -> None:
+    def poses_before(self, number: int, poses: Poses) -> Poses:
+        """The poses from which a group's plane is filmed: those flown while all of them are in front of it.
+
+        Whoever passes the plane of a doorway's side while the shutter is open sees that side edge-on, a fraction of a
+        pixel wide: it is filmed as it looks from the middle of the exposure.
+        """
+        plane, reach_s = self.plane(number), 0.5 * (self._camera.exposure_s + self._camera.readout_s)
+        flown, _ = poses(np.array([-reach_s, 0.0, reach_s]))
+        if (plane.depth_m(flown) > 0.0).all():
+            return poses
+        position, rotation = poses(np.zeros(1))
+        return lambda delay: (np.repeat(position, len(delay), axis=0), np.repeat(rotation, len(delay), axis=0))
+
+    def _add(self, number: int, mask: Image, position: Array, rotation: Array, poses: Poses, out: Image) -> None:
         """Put the part of a group that ``mask`` shows into the picture."""
+        group = self._group(number)
         rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         window = Window(int(cols[0]), int(rows[0]), int(cols[-1] - cols[0] + 1), int(rows[-1] - rows[0] + 1))
         extent = self._extent(group, mask, position, rotation)
-        light = posed_light(group.plane, self._camera, poses, window, extent)
+        light = posed_light(group.plane, self._camera, self.poses_before(number, poses), window, extent)
         part = np.s_[window.top : window.top + window.height, window.left : window.left + window.width]
         out[part] += mask[part] * light * np.float32(group.albedo)
 

@@ -96,6 +96,10 @@ class WallPlane:
         part += np.float32(1.0)
         return part, start.astype(np.float64)
 
+    def depth_m(self, position_m: Array) -> Array:
+        """Distance in front of the plane, negative behind it; position_m (..., 3) [m] -> (...)."""
+        return np.asarray((np.array(self.origin_m) - position_m) @ self.axes[2])
+
     def homography(self, position_m: Array, rotation_WS: Array, camera: CameraModel) -> Array:
         """Matrix from homogeneous pixels to wall px, shape (3, 3).
 
