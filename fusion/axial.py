@@ -46,6 +46,7 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind, build_sources
+from axialnav.fusion.supervisor import SourceState
 from axialnav.models.imu import strapdown
 from axialnav.models.rig import AttitudeSource, Imu
 from axialnav.models.rotations import quaternion_from_euler, rotation_matrix
@@ -55,6 +56,7 @@ from axialnav.models.tangent import rotation_between
 Array = NDArray[np.float64]
 DOUBT_TIME_S = 2.0
 RELIEF = 0.5  # an accelerometer in doubt is believed again below this share of the limit
+SUSPECT_TRUST = 0.1  # mean weight of a UWB source, below which it is flagged
 MAX_TILT_COSINE = 0.2  # steeper than 78 degrees, tilt says nothing of the acceleration
 
 
@@ -250,6 +252,7 @@ class AxialFilter:
                 core["t_aid"] = t_ns
             if log[LOG_CODE] > 0.0:
                 observe_source(t_ns, gap_s, axes, float(log[LOG_WEIGHT]), seen, w)
+                seen["state"] = int(SourceState.SUSPECT if seen["trust"] < SUSPECT_TRUST else SourceState.OK)
             if not used:
                 self._recover(t_ns, seen, core, w)
 

@@ -130,7 +130,7 @@ def run_axial(
     spent = time.perf_counter() - began
     not_inertial = kinds != int(Kind.IMU)
     return BatchResult(
-        unpack_track(events.t_ns[drives], track),
+        unpack_track(events.t_ns[drives], track, len(filter_.sources)),
         unpack_log(config, events, not_inertial, log),
         spent,
         len(events.t_ns),

@@ -20,12 +20,14 @@ from axialnav.fusion.memory import (
     LOG_GATE,
     LOG_INNOVATION,
     LOG_NIS,
+    LOG_REASON,
     LOG_VARIANCE,
     LOG_WEIGHT,
     LOG_WIDTH,
     TRACK_FLAGS,
     TRACK_POS_CROSS,
     TRACK_RESETS,
+    TRACK_STATES,
     TRACK_VARIANCE,
     TRACK_VEL_CROSS,
     TRACK_WIDTH,
@@ -36,6 +38,7 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import InnovationLog, Reason, Track, Verdict, verdict_of
 from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors, kind_of
+from axialnav.fusion.supervisor import unpack_states
 from axialnav.models.state import E_POS, E_VEL, N_ERROR, NOMINAL_SLICES
 
 Array = NDArray[np.float64]
@@ -112,7 +115,10 @@ def _run(config: Config, tables: Mapping[str, Table], progress: Callable[[float]
         if progress is not None and len(part):
             progress((part[-1] + 1) / len(events.t_ns))
     return BatchResult(
-        unpack_track(events.t_ns[is_imu], track), unpack_log(config, events, ~is_imu, log), spent, len(events.t_ns)
+        unpack_track(events.t_ns[is_imu], track, len(src)),
+        unpack_log(config, events, ~is_imu, log),
+        spent,
+        len(events.t_ns),
     )
 
 
@@ -122,8 +128,8 @@ def _step(
     return run(*events, src, memory.core, memory.sources, scratch, settings, track, log)
 
 
-def unpack_track(t_ns: NDArray[np.int64], rows: Array) -> Track:
-    """Name the columns of track rows."""
+def unpack_track(t_ns: NDArray[np.int64], rows: Array, sources: int) -> Track:
+    """Name the columns of track rows; ``sources`` is the number of fused sensors."""
     state = {name: rows[:, cut] for name, cut in NOMINAL_SLICES.items()}
     scalars = {name: state.pop(name)[:, 0] for name in ("blur_scale", "wall_offset_m")}
     variance = rows[:, TRACK_VARIANCE : TRACK_VARIANCE + N_ERROR]
@@ -136,6 +142,7 @@ def unpack_track(t_ns: NDArray[np.int64], rows: Array) -> Track:
         sigma_error=np.sqrt(np.maximum(variance, 0.0)),
         flags=rows[:, TRACK_FLAGS].astype(np.int64),
         resets=rows[:, TRACK_RESETS].astype(np.int64),
+        source_states=unpack_states(rows[:, TRACK_STATES].astype(np.int64), sources),
     )
 
 
@@ -163,7 +170,9 @@ def unpack_log(config: Config, events: Events, keep: NDArray[np.bool_], rows: Ar
     rows, code = rows[keep], rows[keep][:, LOG_CODE].astype(np.int64)
     dof = np.maximum(code, 0)
     fused = rows[:, LOG_WEIGHT] > MIN_WEIGHT
-    reason = np.where(code < 0, -code, np.where(fused, int(Reason.NONE), int(Reason.INNOVATION)))
+    refused = rows[:, LOG_REASON].astype(np.int64)
+    gated = np.where(refused > 0, refused, int(Reason.INNOVATION))
+    reason = np.where(code < 0, -code, np.where(fused, int(Reason.NONE), gated))
     table = np.array([int(verdict_of(r)) for r in Reason])
     verdict = np.where(fused, int(Verdict.FUSED), table[reason])
     beyond = np.arange(3) >= dof[:, None]

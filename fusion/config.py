@@ -143,6 +143,8 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     bias_time_s: Positive = 2.5
     bias_length_m: Positive = 1.0
     correlation_time_s: NonNegative = 0.014
+    nlos_db: float = 2.0
+    nlos_scale_db: Positive = 2.5
     gate: Gate = Gate(soft_sigma=2.5)
 
 
@@ -234,8 +236,29 @@ class DelayTuning(_Table, frozen=True, kw_only=True):
 
 
 class SupervisorTuning(_Table, frozen=True, kw_only=True):
-    """When a source is held suspect, re-anchored or reported silent."""
+    """When a source is held suspect, re-anchored or reported silent.
 
+    UWB is compared with a shadow that knows inertia and pixel motion only, whose acceleration is wrong by
+    ``shadow_m_s2`` [m s^-2 Hz^-1/2] at least.  Over one and three seconds their ways may differ by ``kinematic_m`` plus
+    ``kinematic_sigmas``.  A source is believed again when they have agreed for ``agree_s`` and its place is within
+    ``fit_m`` plus two sigma of the filter's; an anchor when its path is within ``anchor_m``.
+
+    A UWB reading farther than ``jump_m`` and ``jump_sigmas`` from what that anchor has been saying is a jump.  A value
+    that comes ``stuck_count`` times more while its expectation moves by ``stuck_m`` (UWB) or three sigma (others) is
+    stuck.
+    """
+
+    enabled: bool = True
+    shadow_m_s2: Positive = 0.1
+    kinematic_m: Positive = 0.4
+    kinematic_sigmas: Positive = 3.0
+    agree_s: Positive = 1.5
+    fit_m: Positive = 0.5
+    anchor_m: Positive = 1.0
+    jump_m: Positive = 0.6
+    jump_sigmas: Positive = 6.0
+    stuck_count: Annotated[int, msgspec.Meta(ge=1)] = 4
+    stuck_m: Positive = 0.2
     timeout_s: Positive = 1.0
     dead_reckoning_s: Positive = 1.0
     invalid_s: Positive = 5.0

@@ -21,6 +21,7 @@ from axialnav.fusion.memory import (
     LOG_GATE,
     LOG_INNOVATION,
     LOG_NIS,
+    LOG_REASON,
     LOG_VARIANCE,
     LOG_WEIGHT,
     Memory,
@@ -31,8 +32,9 @@ from axialnav.fusion.memory import (
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
 from axialnav.fusion.packing import Packer
 from axialnav.fusion.readings import BlurLength, CameraFrame, ImuSample, PixelMotion, Reading
-from axialnav.fusion.sources import Kind, Records, build_sources
+from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors
 from axialnav.fusion.stream import HELD, TOO_OLD, CompiledStream, Stream
+from axialnav.fusion.supervisor import SourceState
 from axialnav.models.state import (
     ACCEL_BIAS,
     BLUR_SCALE,
@@ -48,7 +50,8 @@ from axialnav.models.state import (
 
 Array = NDArray[np.float64]
 FUSED = (Verdict.FUSED, Reason.NONE)
-GATED = (Verdict.GATED, Reason.INNOVATION)
+# by the reason that the supervisor gave; where it gave none, the gate refused
+REFUSED = tuple((verdict_of(r), r) for r in (Reason(code or Reason.INNOVATION) for code in range(len(Reason))))
 
 
 class NotStartedError(AxialnavError):
@@ -89,7 +92,7 @@ class CorridorEstimator:
         self._packer = Packer(self.config)
         self._cameras = CameraFeed(self.config)
         self._late_ns = late_ns(self.config)
-        self._sources = build_sources(self.config)
+        self._sources, self._names = build_sources(self.config), fused_sensors(self.config)
         # a plain list: indexing records would cost more than the filter itself
         self._enabled: list[bool] = self._sources["enabled"].tolist()
         self._settings = self._build_settings()
@@ -195,7 +198,7 @@ class CorridorEstimator:
         code = int(row[LOG_CODE])
         if code < 0:
             return self._record(reading, Reason(-code))
-        verdict, reason = FUSED if row[LOG_WEIGHT] > MIN_WEIGHT else GATED
+        verdict, reason = FUSED if row[LOG_WEIGHT] > MIN_WEIGHT else REFUSED[int(row[LOG_REASON])]
         if code == 1:  # spelled out for speed: most readings are scalars
             innovation: tuple[float, ...] = (row[LOG_INNOVATION],)
             variance: tuple[float, ...] = (row[LOG_VARIANCE],)
@@ -228,4 +231,5 @@ class CorridorEstimator:
             flags=flags,
             resets=int(memory.core["resets"][0]),
             last_reset_delta_m=memory.core["last_reset_m"][0].copy(),
+            source_states=dict(zip(self._names, map(SourceState, memory.sources["state"].tolist()), strict=True)),
         )

@@ -20,6 +20,10 @@ Array = NDArray[np.float64]
 Records = NDArray[np.void]
 REMEMBERED: Final = 64  # instants
 LONG_AGO: Final = np.iinfo(np.int64).min // 4
+MAX_ANCHORS: Final = 64
+BLOCKS: Final = 16  # length of the supervisor's rings
+BLOCK_S: Final = 0.25
+SCATTER_START_M: Final = 0.2
 
 MEMORY: Final = np.dtype(
     [
@@ -50,6 +54,20 @@ MEMORY: Final = np.dtype(
         ("path_variance", "f8", N_BIASES),
         ("correction", "f8", 3),  # sum of velocity corrections since the last inertial step [m/s]
         ("correction_rate", "f8", 3),  # their fading mean [m/s^2]
+        # the shadow: the vehicle without UWB (kernels.shadow)
+        ("shadow_p", "f8", 3),
+        ("shadow_v", "f8", 3),
+        ("shadow_V", "f8", (3, 3)),
+        ("shadow_q", "f8"),  # noise of its acceleration, white [m^2/s^3]
+        ("t_shadow", "i8"),  # last pixel motion that corrected it
+        ("flow_j", "f8", 3),  # velocity that pixel motion has added to it [m/s]
+        ("flow_k", "f8", 3),  # and the way that came of it [m]
+        ("block", "i8"),  # number of the current block, and since when
+        ("t_block", "i8"),
+        ("ring_j", "f8", (BLOCKS, 3)),
+        ("ring_k", "f8", (BLOCKS, 3)),
+        ("t_motion_blamed", "i8"),  # inertia sided with UWB against pixel motion
+        ("t_neither", "i8"),  # inertia contradicted pixel motion while UWB did
     ],
     align=True,
 )
@@ -66,6 +84,30 @@ SOURCE_MEMORY: Final = np.dtype(
         ("fit", "f8", (3, 3)),
         ("fit_rhs", "f8", 3),
         ("fit_energy", "f8"),
+        # the supervisor's (kernels.tracker, kernels.supervise)
+        ("state", "i8"),
+        ("held", "i8"),  # whether its readings are refused altogether
+        ("t_first", "i8"),
+        ("t_fit", "i8"),  # last time its place was the filter's
+        ("t_since", "i8"),  # beginning of doubt
+        ("t_disagree", "i8"),  # last time its way was not clearly that of the others
+        ("t_moved", "i8"),  # last time it was clearly another
+        ("scatter", "f8"),  # mean absolute deviation of honest readings from their offsets [m]
+        ("gap", "f8", 3),  # from the filter's position to its place [m]
+        ("reference", "f8", 3),  # of the path that it is compared with, from the shadow's [m]
+        ("latest", "f8"),  # expected value of the last reading, and its sigma
+        ("latest_sigma", "f8"),
+        ("place", "f8", (BLOCKS, 3)),  # ring: where the source is, beside the shadow [m]
+        # per anchor, or per axis of a fix
+        ("offset", "f8", MAX_ANCHORS),
+        ("ring", "f4", (MAX_ANCHORS, BLOCKS)),
+        ("t_heard", "i8", MAX_ANCHORS),
+        ("value", "f8", MAX_ANCHORS),
+        ("expected", "f4", MAX_ANCHORS),
+        ("outside", "i4", MAX_ANCHORS),  # jumps in a row
+        ("repeats", "i4", MAX_ANCHORS),
+        ("anchor_bad", "i4", MAX_ANCHORS),
+        ("bad_block", "i4", MAX_ANCHORS),
     ],
     align=True,
 )
@@ -75,9 +117,11 @@ SCRATCH: Final = np.dtype(
         ("z", "f8", 3), ("h", "f8", 3), ("variance", "f8", 3), ("H", "f8", (3, N_ERROR)), ("S", "f8", (3, 3)),
         ("y", "f8", 3), ("PHt", "f8", N_ERROR), ("gain", "f8", N_ERROR), ("step", "f8", N_ERROR), ("R", "f8", (3, 3)),
         ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 8), ("p", "f8", 3), ("mean_imu", "f8", 6),
-        ("focal_window", "f8", 2), ("row", "f8", 10), ("repeated", "f8"), ("normal", "f8", 3), ("plane", "f8", 2),
+        ("focal_window", "f8", 2), ("row", "f8", 11), ("repeated", "f8"), ("normal", "f8", 3), ("plane", "f8", 2),
         ("x", "f8", N_NOMINAL), ("rate", "f8", 3), ("gained", "f8", 3), ("first", "f8", 6), ("mid", "f8", 6),
         ("last", "f8", 6),
+        ("q", "f8", 3), ("fix", "f8", 3), ("move", "f8", 3), ("rhs", "f8", 3), ("prior", "f8", 3), ("common", "f8"),
+        ("would", "f8"), ("refused", "i8"), ("v_before", "f8", 3),
     ],
     align=True,
 )  # fmt: skip
@@ -85,11 +129,12 @@ SCRATCH: Final = np.dtype(
 # layout of a track row: nominal state, variances of the error state, off-diagonals of position and velocity, rest
 TRACK_STATE, TRACK_VARIANCE, TRACK_POS_CROSS = 0, N_NOMINAL, N_NOMINAL + N_ERROR
 TRACK_VEL_CROSS, TRACK_FLAGS, TRACK_RESETS = TRACK_POS_CROSS + 3, TRACK_POS_CROSS + 6, TRACK_POS_CROSS + 7
-TRACK_WIDTH: Final = TRACK_POS_CROSS + 8
+TRACK_STATES: Final = TRACK_POS_CROSS + 8
+TRACK_WIDTH: Final = TRACK_POS_CROSS + 9
 
 # layout of a log row
-LOG_CODE, LOG_INNOVATION, LOG_VARIANCE, LOG_NIS, LOG_GATE, LOG_WEIGHT = 0, 1, 4, 7, 8, 9
-LOG_WIDTH: Final = 10
+LOG_CODE, LOG_INNOVATION, LOG_VARIANCE, LOG_NIS, LOG_GATE, LOG_WEIGHT, LOG_REASON = 0, 1, 4, 7, 8, 9, 10
+LOG_WIDTH: Final = 11
 
 
 class Memory(NamedTuple):
@@ -106,12 +151,15 @@ class Memory(NamedTuple):
 def new_memory(n_sources: int) -> Memory:
     """Memory of a filter that has not started."""
     sources = np.zeros(n_sources, SOURCE_MEMORY)
-    for stamp in ("t_seen", "t_fused", "t_trusted"):
+    for stamp in ("t_seen", "t_fused", "t_trusted", "t_first", "t_fit", "t_since", "t_disagree", "t_moved", "t_heard"):
         sources[stamp] = LONG_AGO
-    sources["gap_s"] = sources["datum_m"] = np.nan
-    sources["trust"] = 1.0
+    for unknown in ("gap_s", "datum_m", "value", "place", "ring"):
+        sources[unknown] = np.nan
+    sources["trust"], sources["scatter"] = 1.0, SCATTER_START_M
     core = np.zeros(1, MEMORY)
     core["path"], core["path_heard"] = -1, LONG_AGO
+    for stamp in ("t_shadow", "t_motion_blamed", "t_neither"):
+        core[stamp] = LONG_AGO
     return Memory(core, sources)
 
 
@@ -126,6 +174,8 @@ SETTINGS_FIELDS: Final = (
     "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s",
     "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
     "reanchor_aided_s", "reanchor_alone_s",
+    "supervised", "timeout_s", "shadow_m_s2", "kinematic_m", "kinematic_sigmas", "agree_s", "fit_m", "anchor_m",
+    "jump_m", "jump_sigmas", "stuck_count", "stuck_m", "nlos_db", "nlos_scale_db",
 )  # fmt: skip
 SETTINGS: Final = np.dtype([(name, "f8") for name in SETTINGS_FIELDS])
 
@@ -182,5 +232,19 @@ def build_settings(config: Config) -> Records:
         "invalid_s": config.supervisor.invalid_s,
         "reanchor_aided_s": config.supervisor.reanchor_aided_s,
         "reanchor_alone_s": config.supervisor.reanchor_alone_s,
+        "supervised": float(config.supervisor.enabled),
+        "timeout_s": config.supervisor.timeout_s,
+        "shadow_m_s2": config.supervisor.shadow_m_s2,
+        "kinematic_m": config.supervisor.kinematic_m,
+        "kinematic_sigmas": config.supervisor.kinematic_sigmas,
+        "agree_s": config.supervisor.agree_s,
+        "fit_m": config.supervisor.fit_m,
+        "anchor_m": config.supervisor.anchor_m,
+        "jump_m": config.supervisor.jump_m,
+        "jump_sigmas": config.supervisor.jump_sigmas,
+        "stuck_count": float(config.supervisor.stuck_count),
+        "stuck_m": config.supervisor.stuck_m,
+        "nlos_db": config.uwb.nlos_db,
+        "nlos_scale_db": config.uwb.nlos_scale_db,
     }
     return np.array([tuple(float(values[name]) for name in SETTINGS_FIELDS)], dtype=SETTINGS)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+
+from axialnav.fusion.supervisor import SourceState
 
 Array = NDArray[np.float64]
 
@@ -41,6 +44,8 @@ class Reason(IntEnum):
     DISABLED = 12
     NO_MOTION = 13
     NOT_FINITE = 14
+    JUMP = 15
+    STUCK = 16
 
 
 REASONS: dict[Reason, str] = {
@@ -58,6 +63,8 @@ REASONS: dict[Reason, str] = {
     Reason.ALIGNING: "held until the first state is known, then processed",
     Reason.DISABLED: "the source is switched off",
     Reason.NOT_FINITE: "the value, or what the filter expects of it, is not a finite number",
+    Reason.JUMP: "the value jumps away from what its anchor has been saying",
+    Reason.STUCK: "the value stands still while the vehicle moves",
     Reason.NO_MOTION: "the frames so far give no displacement that can be believed",
 }
 
@@ -72,6 +79,9 @@ class Health(IntFlag):
     ACCELEROMETER_FAULT = 8
     UWB_SUSPECT = 16
     POSITION_RESET = 32
+    SOURCE_TIMEOUT = 64
+    MOTION_SUSPECT = 128
+    DISAGREE = 256
 
 
 class Outcome(msgspec.Struct, frozen=True, gc=False):
@@ -112,7 +122,7 @@ class AxialState:
 
     ``uwb_bias_m`` (8,) are the biases of the UWB paths that have a state, 0 where none is;
     ``velocity_covariance`` is 3x3; ``resets`` counts position re-anchorings and ``last_reset_delta_m`` is the jump of
-    the latest one.
+    the latest one.  ``source_states`` tells by name what the supervisor makes of each fused sensor.
     """
 
     t_ns: int
@@ -132,6 +142,7 @@ class AxialState:
     flags: Health
     resets: int
     last_reset_delta_m: Array
+    source_states: Mapping[str, SourceState] = field(default_factory=dict)
 
     @property
     def velocity_valid(self) -> bool:
@@ -150,7 +161,8 @@ class Track:
 
     ``position_covariance`` and ``velocity_covariance`` are (n, 3, 3), ``quaternion_WB`` (n, 4) scalar first,
     ``uwb_bias_m`` (n, 8), ``sigma_error`` (n, 25) the standard deviation of every error state in the order of
-    :mod:`axialnav.models.state`, ``flags`` (n,) of :class:`Health`, ``resets`` (n,) running count.
+    :mod:`axialnav.models.state`, ``flags`` (n,) of :class:`Health`, ``resets`` (n,) running count,
+    ``source_states`` (n, S) of :class:`~axialnav.fusion.supervisor.SourceState`, one column per fused sensor.
     """
 
     t_ns: NDArray[np.int64]
@@ -167,6 +179,7 @@ class Track:
     sigma_error: Array
     flags: NDArray[np.int64]
     resets: NDArray[np.int64]
+    source_states: NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +207,7 @@ def verdict_of(reason: Reason) -> Verdict:
     """Verdict that goes with a reason."""
     if reason is Reason.NONE:
         return Verdict.FUSED
-    if reason is Reason.INNOVATION:
+    if reason in {Reason.INNOVATION, Reason.JUMP, Reason.STUCK}:
         return Verdict.GATED
     if reason is Reason.TOO_OLD:
         return Verdict.LATE

@@ -133,4 +133,4 @@ class Pass:
     def track(self) -> Track:
         """Rows so far, named: filtered before :meth:`backward`, smoothed after."""
         is_imu = self.sources["kind"][self.events.source] == int(Kind.IMU)
-        return unpack_track(self.events.t_ns[is_imu], self.rows)
+        return unpack_track(self.events.t_ns[is_imu], self.rows, len(self.sources))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.chi_square import chi_square_threshold
 from axialnav.fusion.config import Config, Gate
 from axialnav.fusion.errors import ConfigError
+from axialnav.fusion.memory import MAX_ANCHORS
 from axialnav.models.faces import FACE_WIDTH
 from axialnav.models.rig import (
     MAX_FACES,
@@ -42,8 +43,6 @@ class Kind(IntEnum):
     HEIGHT = 7
     ATTITUDE = 8
 
-
-MAX_ANCHORS = 64
 
 SOURCE = np.dtype(
     [

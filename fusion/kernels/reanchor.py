@@ -27,14 +27,20 @@ MAX_INNOVATION_M = 1e3
 
 
 @kernel
-def observe_source(t_ns: int, gap_s: float, axes: int, weight: float, seen: Record, w: Record) -> None:
-    """Add one reading of a source to its fading fit and its mean weight."""
-    step = min(max(gap_s, 0.0), 1.0)
-    fade = math.exp(-step / FIT_TIME_S)
-    blend = min(step / TRUST_TIME_S, 1.0)
+def note_trust(t_ns: int, gap_s: float, time_s: float, weight: float, seen: Record) -> None:
+    """Add one reading to the mean weight of its source, time constant ``time_s``."""
+    blend = min(min(max(gap_s, 0.0), 1.0) / time_s, 1.0)
     seen.trust += blend * (weight - seen.trust)
     if seen.trust > TRUSTED or gap_s > SILENCE_S:
         seen.t_trusted = t_ns  # silence is no refusal: patience starts with the first reading after it
+
+
+@kernel
+def observe_source(t_ns: int, gap_s: float, axes: int, weight: float, seen: Record, w: Record) -> None:
+    """Add one reading of a source to its fading fit and its mean weight."""
+    note_trust(t_ns, gap_s, TRUST_TIME_S, weight, seen)
+    step = min(max(gap_s, 0.0), 1.0)
+    fade = math.exp(-step / FIT_TIME_S)
     _fade_fit(0.0 if gap_s > SILENCE_S else fade, seen)
     for i in range(axes):
         y = w.z[i] - w.h[i]
@@ -70,16 +76,22 @@ def reanchor(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> bool:
         explained += seen.fit_rhs[a] * w.y[a]
     if explained < EXPLAINED * seen.fit_energy:
         return False
-    for row in range(2):
-        _move(w.y, m.x[row], m.P[row])
-    for a in range(3):
-        m.last_reset_m[a] = w.y[a]
-    m.resets += 1
-    m.t_reset = t_ns
+    move_position(t_ns, w.y, m)
     seen.t_trusted = t_ns
     seen.trust = 1.0
     _fade_fit(0.0, seen)
     return True
+
+
+@kernel
+def move_position(t_ns: int, offset: Array, m: Record) -> None:
+    """Shift the position of both filters by ``offset`` (3,) [m]; count it and keep it for those who ask."""
+    for row in range(2):
+        _move(offset, m.x[row], m.P[row])
+    for a in range(3):
+        m.last_reset_m[a] = offset[a]
+    m.resets += 1
+    m.t_reset = t_ns
 
 
 @kernel

@@ -9,12 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.fusion.kernels.examine import examine, learn
 from axialnav.fusion.kernels.measure import BLUR, FLOW, HEIGHT
 from axialnav.fusion.kernels.propagate import propagate
-from axialnav.fusion.kernels.reanchor import observe_source, reanchor
 from axialnav.fusion.kernels.rival import supervise_imu
+from axialnav.fusion.kernels.shadow import start_shadow, step_shadow
+from axialnav.fusion.kernels.supervise import close_block
 from axialnav.fusion.kernels.update import MIN_WEIGHT, fuse, is_uwb
 from axialnav.fusion.memory import (
+    BLOCK_S,
     LOG_CODE,
     LOG_WEIGHT,
     LOG_WIDTH,
@@ -22,23 +25,28 @@ from axialnav.fusion.memory import (
     TRACK_POS_CROSS,
     TRACK_RESETS,
     TRACK_STATE,
+    TRACK_STATES,
     TRACK_VARIANCE,
     TRACK_VEL_CROSS,
 )
 from axialnav.fusion.outcome import Health, Reason
+from axialnav.fusion.supervisor import MAX_STATES, STATE_BITS, SourceState
 from axialnav.models.jit import Record, Records, kernel
-from axialnav.models.state import E_POS, E_VEL, N_ERROR, N_NOMINAL, POS
+from axialnav.models.state import E_POS, E_VEL, N_ERROR, N_NOMINAL, POS, VEL
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 DEAD_RECKONING, VELOCITY_INVALID = int(Health.DEAD_RECKONING), int(Health.VELOCITY_INVALID)
 ACCELEROMETER_FAULT, UWB_SUSPECT = int(Health.ACCELEROMETER_FAULT), int(Health.UWB_SUSPECT)
-POSITION_RESET = int(Health.POSITION_RESET)
+POSITION_RESET, SOURCE_TIMEOUT = int(Health.POSITION_RESET), int(Health.SOURCE_TIMEOUT)
+MOTION_SUSPECT, DISAGREE = int(Health.MOTION_SUSPECT), int(Health.DISAGREE)
+OFF, ALIGNING, OK = int(SourceState.OFF), int(SourceState.ALIGNING), int(SourceState.OK)
+SUSPECT, REACQUIRE = int(SourceState.SUSPECT), int(SourceState.REACQUIRE)
+BLOCK_NS = round(BLOCK_S * 1e9)
 NOT_ALIGNED = int(Reason.NOT_ALIGNED)
 GAP_BLEND = 0.02
 RESET_SHOWN_S = 1.0
-SUSPECT_TRUST = 0.1
 
 
 @kernel
@@ -54,7 +62,7 @@ def run(
     track: Array,
     log: Array,
 ) -> int:
-    """Process sorted events; ``track`` gets a row per inertial sample, ``log`` (n, 10) a row per event.
+    """Process sorted events; ``track`` gets a row per inertial sample, ``log`` (n, 11) a row per event.
 
     Returns the number of track rows written.  A row of ``log`` holds in its first column the number of axes, or minus
     the reason why the reading could not be used (0 for inertial samples).
@@ -64,11 +72,10 @@ def run(
     for e in range(t_ns.shape[0]):
         s, seen = sources[source[e]], memory[source[e]]
         if s.kind == 0:
-            dt = propagate(t_ns[e], values[e], s.R_BS, m, w, c)
-            if dt > 0.0:
-                supervise_imu(dt, m, c)
+            inertial_step(t_ns[e], values[e], s, sources, memory, m, w, c)
             write_track(m, track[rows])
             track[rows, TRACK_FLAGS] = health(t_ns[e], sources, memory, m, c)
+            track[rows, TRACK_STATES] = packed_states(memory)
             rows += 1
         elif m.started == 0:
             log[e, LOG_CODE] = -NOT_ALIGNED
@@ -78,17 +85,38 @@ def run(
 
 
 @kernel
+def inertial_step(
+    t_ns: int, values: Array, s: Record, sources: Records, memory: Records, m: Record, w: Record, c: Record
+) -> None:
+    """Advance the filter, its shadow and the supervisor's clock to an inertial sample."""
+    for i in range(3):
+        w.v_before[i] = m.x[0, VEL + i]
+    dt = propagate(t_ns, values, s.R_BS, m, w, c)
+    if m.t_block == 0:
+        start_shadow(m)
+        m.t_block = t_ns
+    if dt > 0.0:
+        step_shadow(dt, w.v_before, m)
+        supervise_imu(dt, m, c)
+        if t_ns - m.t_block >= BLOCK_NS and c.supervised > 0.0:
+            close_block(t_ns, sources, memory, m, w, c)
+
+
+@kernel
 def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record, log: Array) -> None:
-    """One reading: bookkeeping, both filters, recovery."""
+    """One reading: bookkeeping, what the supervisor says, both filters, what the supervisor learns."""
     kind = s.kind
     gap_s = (t_ns - seen.t_seen) * 1e-9
     note_arrival(t_ns, gap_s, kind, values, seen, m)
+    w.refused = examine(t_ns, s, seen, values, m, w, c) if c.supervised > 0.0 else 0
+    for i in range(3):
+        w.v_before[i] = m.x[0, VEL + i]
     # the rival first, so that the record and the scratch left behind are the estimate's
     evidence, both_used = 0.0, m.on_trial == 1
     for row in range(m.on_trial, -1, -1):
         likelihood = fuse(row, t_ns, s, seen, values, m, w, c)
         evidence += likelihood if row == 1 else -likelihood
-        both_used = both_used and w.row[LOG_CODE] > 0.0
+        both_used = both_used and w.row[LOG_CODE] > 0.0 and w.refused == 0
     if both_used:
         m.evidence += evidence
     for k in range(LOG_WIDTH):
@@ -99,18 +127,16 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
         if FLOW <= kind <= BLUR:
             m.t_flow = t_ns
             m.t_aid = t_ns
-    if is_uwb(kind):
-        if used:
-            m.t_aid = t_ns
-        if log[LOG_CODE] > 0.0:
-            observe_source(t_ns, gap_s, int(log[LOG_CODE]), log[LOG_WEIGHT], seen, w)
-        if not used:
-            reanchor(t_ns, seen, m, w, c)
+    if is_uwb(kind) and used:
+        m.t_aid = t_ns
+    learn(t_ns, gap_s, s, seen, m, w)
 
 
 @kernel
 def note_arrival(t_ns: int, gap_s: float, kind: int, values: Array, seen: Record, m: Record) -> None:
     """Learn how often the source speaks and, for heights, where its zero is."""
+    if seen.state == OFF:
+        seen.state, seen.t_first, seen.t_fit = ALIGNING, t_ns, t_ns
     if gap_s < 1.0:
         known = np.isfinite(seen.gap_s)
         seen.gap_s = seen.gap_s + GAP_BLEND * (gap_s - seen.gap_s) if known else max(gap_s, 1e-3)
@@ -133,9 +159,25 @@ def health(t_ns: int, sources: Records, memory: Records, m: Record, c: Record) -
     if m.resets > 0 and (t_ns - m.t_reset) * 1e-9 < RESET_SHOWN_S:
         flags |= POSITION_RESET
     for i in range(sources.shape[0]):
-        if is_uwb(sources[i].kind) and memory[i].trust < SUSPECT_TRUST:
-            flags |= UWB_SUSPECT
+        kind, seen = sources[i].kind, memory[i]
+        if kind == 0 or seen.state == OFF:
+            continue
+        if (t_ns - max(seen.t_fused, seen.t_first)) * 1e-9 > c.timeout_s:
+            flags |= SOURCE_TIMEOUT
+        if seen.state == SUSPECT or seen.state == REACQUIRE:
+            flags |= UWB_SUSPECT if is_uwb(kind) else MOTION_SUSPECT
+    if flags & UWB_SUSPECT and (flags & MOTION_SUSPECT or (t_ns - m.t_neither) * 1e-9 < c.agree_s):
+        flags |= DISAGREE
     return flags
+
+
+@kernel
+def packed_states(memory: Records) -> int:
+    """States of the first seventeen sources in one number."""
+    packed = 0
+    for i in range(min(memory.shape[0], MAX_STATES)):
+        packed |= memory[i].state << (STATE_BITS * i)
+    return packed
 
 
 @kernel

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import correct, project
 from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_RANGE, measure, repetition
-from axialnav.fusion.memory import LOG_CODE, LOG_GATE, LOG_INNOVATION, LOG_NIS, LOG_VARIANCE, LOG_WEIGHT, LOG_WIDTH
+from axialnav.fusion.memory import (
+    LOG_CODE,
+    LOG_GATE,
+    LOG_INNOVATION,
+    LOG_NIS,
+    LOG_REASON,
+    LOG_VARIANCE,
+    LOG_WEIGHT,
+    LOG_WIDTH,
+)
 from axialnav.fusion.outcome import Reason
 from axialnav.models.jit import Record, kernel
 from axialnav.models.rotations import matrix_from_quaternion
@@ -38,6 +47,13 @@ def redescend(nis_per_axis: float, soft_nis: float) -> float:
 
 
 @kernel
+def obstructed(power_difference_db: float, c: Record) -> float:
+    """Factor on the variance of a range whose total power exceeds that of its first path; NaN: not reported, 1."""
+    excess = (power_difference_db - c.nlos_db) / c.nlos_scale_db
+    return 1.0 + excess * excess if excess > 0.0 else 1.0
+
+
+@kernel
 def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
     """Try one reading on filter ``row``; leave its record in ``w.row`` (10,) and return its log-likelihood.
 
@@ -54,23 +70,30 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     for k in range(LOG_WIDTH):
         w.row[k] = 0.0
     w.row[LOG_CODE] = axes
+    w.would = 0.0
     if axes < 0:
         return 0.0
+    if s.kind == UWB_RANGE:
+        w.variance[0] *= obstructed(values[3] - values[4], c)
     repeated = w.repeated
     nis, log_det = _innovate(axes, repeated, P, w)
     if not np.isfinite(nis):
         w.row[LOG_CODE] = -NOT_FINITE
         return 0.0
     gate = s.gate[axes - 1]
-    weight = redescend(nis / axes, s.soft_nis) if nis <= gate else 0.0
+    w.would = redescend(nis / axes, s.soft_nis) if nis <= gate else 0.0
+    weight = w.would if w.refused == 0 else 0.0
     w.row[LOG_NIS], w.row[LOG_GATE], w.row[LOG_WEIGHT] = nis, gate, weight
     if weight > MIN_WEIGHT:
         _apply(axes, repeated, repeated / weight, x, P, w)
         if row == 0:
             for k in range(3):
                 m.correction[k] += w.step[E_VEL + k]
-    elif row == 0:
+    elif row == 0 and w.refused == 0:
         _note_refused(axes, repeated, REFUSED_COUNTS * math.sqrt(gate / nis), P, m, w)
+    if w.refused > 0:
+        w.row[LOG_REASON] = w.refused
+        return 0.0
     alike = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
     return float(-0.5 * (min(nis, gate) + log_det) / alike)
 

@@ -19,7 +19,7 @@ SEEDS = 40
 ASKED_M_S, ASKED_CLEAN_M_S, ASKED_LOST, ASKED_SUSPECT = 0.09, 0.06, 0.01, 0.01
 LOST_M, LAST_S = 0.6, 20.0
 ON: dict[str, str] = {}
-OFF = {"supervisor.reanchor_aided_s": "1e9", "supervisor.reanchor_alone_s": "1e9"}
+OFF = {"supervisor.enabled": "false"}
 HEAD = (
     "UWB as", "fault", "asked [m/s]", "velocity on", "worst flight", "off", "position on [m]", "off", "lost on", "off",
     "suspect", "resets", "verdict",

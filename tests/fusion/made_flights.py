@@ -304,7 +304,7 @@ NEVER = 1.0 - 1e-15  # share of readings that pass a gate which is as good as re
 
 
 def textbook(config: Config) -> Config:
-    """The plain extended Kalman filter: no redescending weights, readings independent, the accelerometer believed."""
+    """The plain extended Kalman filter: no redescending weights, readings independent, everything believed."""
     change = msgspec.structs.replace
     wide = Gate(probability=NEVER, soft_sigma=1e9)
     height = change(config.height, gate=wide, correlation_time_s=0.0)
@@ -315,4 +315,5 @@ def textbook(config: Config) -> Config:
         **{name: change(getattr(config, name), gate=wide) for name in ("flow", "range", "attitude")},
         height=height,
         imu_fault=change(config.imu_fault, enabled=False),
+        supervisor=change(config.supervisor, enabled=False),
     )

@@ -46,7 +46,8 @@ def test_a_filter_that_sees_the_floor_waits_fifteen_seconds_then_moves(uwb: str,
     miss, t = miss_m(flight, result), flight.t_s
     assert miss[t < PATIENCE_S - 0.1].min() > 0.6 * CASES[uwb]
     assert result.track.resets[-1] == 1
-    assert miss[t > PATIENCE_S + 2.5].max() < 0.5
+    # both ways must have agreed for a while before
+    assert miss[t > PATIENCE_S + 5.0].max() < 0.5
 
 
 def test_the_patience_is_that_of_the_configuration() -> None:
@@ -63,7 +64,7 @@ def test_switched_off_it_stays_lost(uwb: str) -> None:
     assert result.track.resets.max() == 0
     assert miss_m(flight, result).min() > 0.4 * CASES[uwb]
     mine = result.log.source == result.log.sensors.index(uwb)
-    assert (result.log.verdict[mine] == Verdict.GATED).mean() > 0.8
+    assert (result.log.verdict[mine] != Verdict.FUSED).mean() > 0.8
 
 
 def test_the_last_reset_is_told_with_the_state() -> None:
