@@ -70,6 +70,7 @@ def make_track(velocity_error: Array, position_error: Array | None = None, sigma
         sigma_error=np.full((count, N_ERROR), 0.01),
         flags=np.zeros(count, dtype=np.int64),
         resets=np.zeros(count, dtype=np.int64),
+        source_states=np.zeros((count, 0), dtype=np.int8),
     )
 
 
