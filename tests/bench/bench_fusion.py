@@ -21,6 +21,7 @@ from tests.bench.prepared import Prepared, halfway, one_kind, prepare
 from tests.bench.process_bench import HEAD as PROCESS_HEAD
 from tests.bench.process_bench import process_rows
 from tests.bench.timing import median_of
+from tests.fusion.made_readings import known_ns
 
 REPEATS = 5
 KERNEL_HEAD = (
@@ -96,11 +97,11 @@ def filterpy_rows(count: int) -> Iterator[list[str]]:
 
 def push_rows(flight: Flight, count: int = PUSHED) -> Iterator[list[str]]:
     """The streaming estimator, reading by reading, in order and with everything but the IMU late by 0.1 s."""
-    readings = list(islice(flight.readings(), count))
+    readings = sorted(islice(flight.readings(), count), key=known_ns)
     estimator = CorridorEstimator(flight.config)
     for reading in readings:  # what is not compiled yet is compiled here
         estimator.push(reading)
-    late = sorted(readings, key=lambda r: r.t_ns if isinstance(r, ImuSample) else r.t_ns + LATE_NS)
+    late = sorted(readings, key=lambda r: known_ns(r) + (0 if isinstance(r, ImuSample) else LATE_NS))
     for name, order in (("in order", readings), ("aids 0.1 s late", late)):
 
         def push_all(estimator: CorridorEstimator, order: Sequence[Reading] = order) -> None:

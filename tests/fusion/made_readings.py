@@ -51,9 +51,14 @@ def readings_of(name: str, table: Table) -> Iterator[Reading]:
 
 
 def readings(flight: MadeFlight) -> list[Reading]:
-    """All readings of a flight in the order of their stamps."""
+    """All readings of a flight in the order in which they can be known: pixel motion when its window ends."""
     every = [reading for name, table in flight.tables.items() for reading in readings_of(name, table)]
-    return sorted(every, key=lambda reading: reading.t_ns)
+    return sorted(every, key=known_ns)
+
+
+def known_ns(reading: Reading) -> int:
+    """When a reading can be known at the earliest [ns]."""
+    return reading.t_ns + (round(0.5e9 * reading.window_s) if isinstance(reading, PixelMotion) else 0)
 
 
 def counts(outcomes: list[Outcome]) -> dict[str, int]:

@@ -21,7 +21,8 @@ def flown(seed: int, enabled: bool = True, end_s: float = 99.0, duration_s: floa
     """Flight and result; UWB at 200 Hz as on the vehicles that showed such a fault."""
     fault = {"start_s": START_S, "end_s": end_s, "ramp_s": ramp_s, "size_m_s2": -3.0, "wander_m_s2": 1.0}
     flight = fly(Scene(seed=seed, duration_s=duration_s, sensors=RIG, uwb_rate_hz=200.0, accel_fault=fault))
-    config = flight.config.with_params({"imu_fault.enabled": str(enabled).lower()})
+    on = str(enabled).lower()  # the supervisor alone saves some of it
+    config = flight.config.with_params({"imu_fault.enabled": on, "supervisor.enabled": on})
     return flight, run_batch(config, flight.tables)
 
 
