@@ -136,16 +136,16 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     ``coth(dt / 2 correlation_time_s)``.
     """
 
-    sigma_m: Positive = 0.1
+    sigma_m: Positive = 0.09
     fix_sigma_m: Positive = 1.0
-    bias_sigma_m: NonNegative = 0.15
+    bias_sigma_m: NonNegative = 0.14
     fix_bias_sigma_m: NonNegative = 0.0
-    bias_time_s: Positive = 2.5
-    bias_length_m: Positive = 1.0
+    bias_time_s: Positive = 0.6
+    bias_length_m: Positive = 0.4
     correlation_time_s: NonNegative = 0.014
     nlos_db: float = 2.0
     nlos_scale_db: Positive = 2.5
-    gate: Gate = Gate(soft_sigma=2.5)
+    gate: Gate = Gate(soft_sigma=2.2)
 
 
 class FlowTuning(_Table, frozen=True, kw_only=True):

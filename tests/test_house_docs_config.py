@@ -92,7 +92,7 @@ def test_every_number_has_a_unit() -> None:
 
 def test_a_wrong_default_would_be_noticed() -> None:
     """The comparison is of text, so it has to see what it compares."""
-    assert TABLES["[uwb]"]["gate.soft_sigma"] == written(tables.UwbTuning().gate.soft_sigma) == "2.5"
+    assert TABLES["[uwb]"]["gate.soft_sigma"] == written(tables.UwbTuning().gate.soft_sigma) == "2.2"
     assert TABLES["[flow]"]["gate.soft_sigma"] == "3.0"
     assert TABLES["[initial]"]["position_m"] == "required"
     assert sum(len(keys) for keys in TABLES.values()) > 70
