@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import shutil
+import signal
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import msgspec
 
-from axialnav.fusion.errors import FlightError
+from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.replay.flight import Flight
 from axialnav.replay.simulate.flight import simulate
 from axialnav.replay.simulate.mission import CameraPlan, Mission, Opening, SectionPlan, UwbPlan, VehiclePlan
@@ -60,20 +61,23 @@ def fly_demo(folder: Path, progress: Callable[[float], None] | None = None) -> F
 @contextmanager
 def rehearsed() -> Iterator[None]:
     """Compile what a replay needs on another core while the block runs; nothing is lost where that fails."""
-    other = multiprocessing.get_context("spawn").Process(target=_rehearse, daemon=True)
-    other.start()
-    try:
-        yield
-        other.join()
-    finally:
-        other.terminate()
-        other.join()
+    with tempfile.TemporaryDirectory() as folder:
+        context = multiprocessing.get_context("spawn")
+        other = context.Process(target=_rehearse, args=(Path(folder) / "flight",), daemon=True)
+        other.start()
+        try:
+            yield
+            other.join()
+        finally:
+            other.terminate()
+            other.join()
 
 
-def _rehearse() -> None:
+def _rehearse(folder: Path) -> None:
     """Fly and replay the beginning of the mission, so that numba's cache holds everything that is compiled."""
     from axialnav.replay.run import replay
 
-    with tempfile.TemporaryDirectory() as folder:
-        beginning = msgspec.structs.replace(demo_mission(), duration_s=REHEARSED_S)
-        replay(simulate(beginning, Path(folder) / "flight"))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever interrupts speaks to the demo, which ends this process
+    beginning = msgspec.structs.replace(demo_mission(), duration_s=REHEARSED_S)
+    with suppress(ConfigError, FlightError, OSError):
+        replay(simulate(beginning, folder))
