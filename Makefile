@@ -41,10 +41,10 @@ demo: $(INSTALLED)
 	@$(BIN)/axialnav demo
 
 test: $(INSTALLED)
-	@$(BIN)/python -m pytest -rfEs
+	@$(BIN)/python -m pytest -rfEs -n auto --dist loadfile
 
 quick: $(INSTALLED)
-	@$(BIN)/python -m pytest -rfEs -m "not slow"
+	@$(BIN)/python -m pytest -rfEs -n auto --dist loadfile -m "not slow"
 
 lint: $(INSTALLED)
 	@$(BIN)/ruff check .

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.alignment import align
 from axialnav.fusion.config import Config
-from axialnav.fusion.events import Events, Table, after_stamp_ns, pack_tables
+from axialnav.fusion.events import Events, Table, pack_tables, reading_stamps
 from axialnav.fusion.handedness import explains_better, is_undecided, mirror_config, mirror_tables, mirror_track
 from axialnav.fusion.kernels.run import run
 from axialnav.fusion.kernels.update import MIN_WEIGHT
@@ -37,7 +37,7 @@ from axialnav.fusion.memory import (
     new_scratch,
 )
 from axialnav.fusion.outcome import InnovationLog, Reason, Track, Verdict, verdict_of
-from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors, kind_of
+from axialnav.fusion.sources import Kind, Records, build_sources, fused_sensors
 from axialnav.fusion.supervisor import unpack_states
 from axialnav.models.state import E_POS, E_VEL, N_ERROR, NOMINAL_SLICES
 
@@ -155,16 +155,6 @@ def _covariance(variance: Array, cross: Array) -> Array:
     return out
 
 
-def _stamps(config: Config, events: Events) -> NDArray[np.int64]:
-    """Stamps of the readings, which for pixel motion are earlier than their events."""
-    stamps = events.t_ns.copy()
-    for index, name in enumerate(fused_sensors(config)):
-        kind, mine = kind_of(config.sensor[name]), events.source == index
-        if kind is not None:
-            stamps[mine] -= after_stamp_ns(kind, events.values[mine, 0])
-    return stamps
-
-
 def unpack_log(config: Config, events: Events, keep: NDArray[np.bool_], rows: Array) -> InnovationLog:
     """Name the columns of log rows and translate codes to verdicts and reasons."""
     rows, code = rows[keep], rows[keep][:, LOG_CODE].astype(np.int64)
@@ -179,7 +169,7 @@ def unpack_log(config: Config, events: Events, keep: NDArray[np.bool_], rows: Ar
     nothing = dof == 0
     return InnovationLog(
         sensors=fused_sensors(config),
-        t_ns=_stamps(config, events)[keep],
+        t_ns=reading_stamps(config, events)[keep],
         source=events.source[keep],
         verdict=verdict,
         reason=reason,

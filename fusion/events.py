@@ -112,6 +112,16 @@ def pack_tables(config: Config, tables: Mapping[str, Table]) -> Events:
     return Events(t_ns[order], source[order], np.ascontiguousarray(value[order]))
 
 
+def reading_stamps(config: Config, events: Events) -> NDArray[np.int64]:
+    """Stamps of the readings [ns], shape (n,), which for pixel motion are earlier than those of their events."""
+    stamps = events.t_ns.copy()
+    for index, name in enumerate(fused_sensors(config)):
+        kind, mine = kind_of(config.sensor[name]), events.source == index
+        if kind is not None:
+            stamps[mine] -= after_stamp_ns(kind, events.values[mine, 0])
+    return stamps
+
+
 def after_stamp_ns(kind: Kind, first_value: NDArray[np.float64]) -> NDArray[np.int64]:
     """How long after its stamp a reading is processed [ns], by its first value.
 

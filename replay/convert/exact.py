@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
-from axialnav.fusion.events import COLUMNS, WIDTH, pack_tables
+from axialnav.fusion.events import COLUMNS, WIDTH, pack_tables, reading_stamps
 from axialnav.fusion.sources import fused_sensors, kind_of
 from axialnav.fusion.strict_toml import parse
 from axialnav.models.rig import Camera, Uwb
@@ -48,7 +48,7 @@ def exact_rows(flight: Flight) -> NDArray[Any]:
     """Rows of all readings but pictures, and of the references, in time order; fields source, t_ns, values (8,)."""
     config = _without_cameras(flight.config)
     events = pack_tables(config, flight.tables_for(config))
-    parts = [(events.source, events.t_ns, events.values)]
+    parts = [(events.source, reading_stamps(config, events), events.values)]
     if flight.truth is not None:
         truth = flight.truth
         parts.append(_part(TRUTH_POSE, truth.t_ns, truth.position_m, truth.quaternion_WB))

@@ -140,7 +140,7 @@ def _stripes_row(title: str, error: Array, windows: int) -> tuple[Cell, ...]:
 
 def _paint(figure: Any, flights: list[FieldFlight]) -> None:
     """Fig. 11: speed over time, one panel a flight."""
-    grid = figure.subplots(len(SECTIONS), 2, sharex=True, sharey=True)
+    grid = figure.subplots(len(SECTIONS), 2, sharex=True, sharey=True, squeeze=False)
     for axes, flight in zip(grid.ravel(), flights, strict=True):
         stripes = flight.stripes
         axes.plot(stripes.t_s, stripes.speed_m_s, ".", ms=2, color=COLOURS[1], label=STRIPES, rasterized=True)

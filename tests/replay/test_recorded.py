@@ -13,6 +13,7 @@ from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.flight_cut import cut_flight
 from axialnav.replay.run import replay, resolve
 from axialnav.replay.sample_flights import sample_flight_path
+from tests.fusion.made_readings import known_ns
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,8 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Flight, Path, np.nd
     estimator = CorridorEstimator(config)
     path = tmp_path_factory.mktemp("flown") / "flight.mcap"
     rng = np.random.default_rng(4)
-    readings = list(flight.readings())
+    end_ns = int(flight.tables["imu0"].t_ns[-1])  # what is known later is not in the last row of a replay
+    readings = [r for r in flight.readings() if known_ns(r) <= end_ns]
     arrival = np.argsort([r.t_ns + int(rng.integers(0, 80_000_000)) for r in readings], kind="stable")
     with Recorder(path, config=config, about={"name": flight.name}) as recorder:
         for order in arrival.tolist():

@@ -122,7 +122,7 @@ def test_what_a_flight_cannot_tell_is_said_and_left_alone() -> None:
 
 
 def test_the_verb_writes_what_replay_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    flight, held = (write_flight(flown(seed, 6.0), tmp_path / f"f{seed}") for seed in (1, 2))
+    flight, held = (write_flight(flown(seed, 12.0), tmp_path / f"f{seed}") for seed in (1, 2))
     before = {path: path.read_bytes() for path in flight.rglob("*") if path.is_file()}
     out = tmp_path / "tuned.toml"
     options = ["--free", "range.sigma_m,sensor.range0.sigma_m", "--free", "delay.late_s.uwb0", "--workers", "1"]
