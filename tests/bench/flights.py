@@ -76,12 +76,14 @@ HARD_GATE = {f"{source}.gate.soft_sigma": NEVER for source in GATED}
 NO_BIASES = {"uwb.bias_sigma_m": "0.0", "uwb.sigma_m": "0.15"}
 WHITE_UWB = {**NO_BIASES, "uwb.correlation_time_s": "0.0"}
 NO_REANCHOR = {"supervisor.reanchor_aided_s": NEVER, "supervisor.reanchor_alone_s": NEVER}
+NO_SUPERVISOR = {"supervisor.enabled": "false"}
 RIGHT_HANDED = {"handedness": '"right"'}
 PLAIN = {
     **NO_RIVAL,
     **HARD_GATE,
     **WHITE_UWB,
     **NO_REANCHOR,
+    **NO_SUPERVISOR,
     **RIGHT_HANDED,
     **{f"{source}.gate.probability": repr(FOUR_SIGMA) for source in GATED},
     "uwb.sigma_m": "0.2",
@@ -93,6 +95,7 @@ VARIANTS: dict[str, dict[str, str]] = {
     "no bias states": NO_BIASES,
     "white UWB noise": WHITE_UWB,
     "no re-anchoring": NO_REANCHOR,
+    "no supervisor": NO_SUPERVISOR,
     "right-handed": RIGHT_HANDED,
     "plain": PLAIN,
 }
