@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from axialnav.fusion.errors import FlightError
 from axialnav.fusion.sources import fused_sensors
 from axialnav.models.rig import AttitudeSource, Camera, Imu, RangeFinder
 from axialnav.replay.convert.exact import ROW, ROW_MESSAGE, TEXT_MESSAGE, exact_rows, exact_text, row_sum, text_pieces
+from axialnav.replay.convert.new_file import write_new
 from axialnav.replay.flight import Flight
 
 HEAD = b"\xa3\x95"
@@ -41,14 +41,7 @@ def write_dataflash(flight: Flight, path: Path) -> Path:
     FlightError
         The file exists or cannot be written.
     """
-    try:
-        with path.open("xb") as file:
-            file.writelines(_messages(flight))
-    except FileExistsError:
-        raise FlightError(f"{path}: exists already; remove it or choose another name") from None
-    except OSError as error:
-        raise FlightError(f"{path}: cannot be written: {error.strerror or error}") from None
-    return path
+    return write_new(path, _messages(flight))
 
 
 def _pack(name: str, *values: Any) -> bytes:

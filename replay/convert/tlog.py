@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from axialnav.fusion.errors import FlightError
 from axialnav.fusion.sources import fused_sensors
 from axialnav.models.rig import AttitudeSource, Camera, Flow, Imu, RangeFinder
 from axialnav.replay.convert.exact import ROW, ROW_TYPE, TEXT_HEAD, TEXT_TYPE, exact_rows, exact_text, text_pieces
+from axialnav.replay.convert.new_file import write_new
 from axialnav.replay.flight import Flight
 
 PIECE_BYTES = 120
@@ -37,14 +37,7 @@ def write_tlog(flight: Flight, path: Path) -> Path:
     FlightError
         The file exists or cannot be written.
     """
-    try:
-        with path.open("xb") as file:
-            file.writelines(_records(flight))
-    except FileExistsError:
-        raise FlightError(f"{path}: exists already; remove it or choose another name") from None
-    except OSError as error:
-        raise FlightError(f"{path}: cannot be written: {error.strerror or error}") from None
-    return path
+    return write_new(path, _records(flight))
 
 
 def _records(flight: Flight) -> Iterator[bytes]:
