@@ -60,17 +60,18 @@ class CameraFeed:
 
 
 def rotation_sigma_px(config: Config, camera: str, period_s: float) -> float:
-    """What one gyro sample's noise makes of the image's rotation over a frame period [px].
+    """What the gyro's noise makes of the image's rotation over a frame period [px].
 
-    The filter takes the rotation out of a window with the sample at its middle, so that the noise of that sample is
-    noise of the reading: ``f T`` times density times the root of the sampling rate.
+    The filter takes the rotation out with the mean rate over the period, so that the noise of that mean is noise of the
+    reading: ``f T`` times density over the root of the period, or of the sampling period where that is longer.
     """
     imu = next((s for n, s in config.sensor.items() if isinstance(s, Imu) and n not in config.disabled), None)
     spec = config.sensor[camera]
     if imu is None or not isinstance(spec, Camera):
         return 0.0
-    sample = imu.gyro_noise_density * config.imu.gyro_noise_scale * math.sqrt(imu.rate_hz or USUAL_IMU_HZ)
-    return spec.focal_px[0] * period_s * sample
+    rate_hz = min(imu.rate_hz or USUAL_IMU_HZ, 1.0 / period_s)
+    mean = imu.gyro_noise_density * config.imu.gyro_noise_scale * math.sqrt(rate_hz)
+    return spec.focal_px[0] * period_s * mean
 
 
 def _motion_estimator(camera: Camera, config: Config) -> MotionEstimator:

@@ -24,6 +24,7 @@ MAX_ANCHORS: Final = 64
 BLOCKS: Final = 16  # length of the supervisor's rings
 BLOCK_S: Final = 0.25
 SCATTER_START_M: Final = 0.2
+COLUMNS: Final = 9  # of a camera's picture that are looked at, an odd number
 
 MEMORY: Final = np.dtype(
     [
@@ -116,11 +117,12 @@ SCRATCH: Final = np.dtype(
     [
         ("z", "f8", 3), ("h", "f8", 3), ("variance", "f8", 3), ("H", "f8", (3, N_ERROR)), ("S", "f8", (3, 3)),
         ("y", "f8", 3), ("PHt", "f8", N_ERROR), ("gain", "f8", N_ERROR), ("step", "f8", N_ERROR), ("R", "f8", (3, 3)),
-        ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 8), ("p", "f8", 3), ("mean_imu", "f8", 6),
+        ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 11), ("p", "f8", 3), ("mean_imu", "f8", 6),
         ("focal_window", "f8", 2), ("row", "f8", 11), ("repeated", "f8"), ("normal", "f8", 3), ("plane", "f8", 2),
         ("x", "f8", N_NOMINAL), ("rate", "f8", 3), ("gained", "f8", 3), ("first", "f8", 6), ("mid", "f8", 6),
-        ("last", "f8", 6),
+        ("last", "f8", 6), ("look", "f8", 3),
         ("q", "f8", 3), ("fix", "f8", 3), ("move", "f8", 3), ("rhs", "f8", 3), ("prior", "f8", 3), ("common", "f8"),
+        ("column", "f8", COLUMNS), ("column_H", "f8", (COLUMNS, N_ERROR)), ("weight", "f8", COLUMNS),
         ("would", "f8"), ("refused", "i8"), ("v_before", "f8", 3),
     ],
     align=True,

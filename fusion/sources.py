@@ -28,6 +28,7 @@ from axialnav.models.rig import (
 )
 
 Records = NDArray[np.void]
+COHERENCE_PX = 2.4  # how far parts of a picture may drift apart over a window of frames and still be seen as one
 
 
 class Kind(IntEnum):
@@ -56,6 +57,8 @@ SOURCE = np.dtype(
         ("R_BS", "f8", (3, 3)),
         ("lever_B", "f8", 3),
         ("focal_px", "f8", 2),
+        ("half_view", "f8"),  # half of a camera's picture over its focal length, 0 for what has no picture
+        ("coherence_px", "f8"),
         ("normal_W", "f8", 3),
         ("offset_m", "f8"),
         ("offset_is_state", "?"),
@@ -142,6 +145,8 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         "R_BS": spec.rotation_BS,
         "lever_B": spec.lever_arm_m,
         "focal_px": [1.0, 1.0],
+        "half_view": 0.0,
+        "coherence_px": 1.0,
         "normal_W": [0.0, 0.0, 1.0],
         "offset_m": 0.0,
         "offset_is_state": False,
@@ -161,7 +166,11 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
     if isinstance(spec, Flow | BlurMeter):
         row |= {"focal_px": spec.focal_px, "low": config.flow.min_quality}
     if isinstance(spec, Camera):
-        row["focal_px"] = spec.focal_px
+        row |= {
+            "focal_px": spec.focal_px,
+            "half_view": 0.5 * spec.resolution[0] / spec.focal_px[0],
+            "coherence_px": COHERENCE_PX / (config.camera.frames - 1),
+        }
     if isinstance(spec, RangeFinder):
         row |= {"low": spec.range_min_m, "high": spec.range_max_m}
     if isinstance(spec, Uwb):

@@ -6,11 +6,17 @@ A wall point on the optical axis at distance Z moves in the image with
     \dot u = -f_x \left( \frac{v_{S,x}}{Z} + \omega_{S,y} \right), \qquad
     \dot v = -f_y \left( \frac{v_{S,y}}{Z} - \omega_{S,x} \right)
 
-(S: camera axes; v and omega of the camera itself, so the lever arm enters).  Over a window T the content moves by
-``(1 + k) T`` times that, with the blur scale k as a state.  The reading stays in pixels: dividing by a noisy distance
-first would correlate it with the range finder and make its noise depend on speed.
+(S: camera axes; v and omega of the camera itself, so the lever arm enters).  Beside the axis, where the ray through the
+image has the slope a = x / f, it moves with
 
-Source: Longuet-Higgins and Prazdny (1980), eq. 2.7-2.8, at the image centre.
+.. math::
+    \dot u = -f_x \left( \frac{v_{S,x} - a v_{S,z}}{Z(a)} + (1 + a^2) \omega_{S,y} \right)
+
+and likewise for y.  Over a window T the content moves by ``(1 + k) T`` times that, with the blur scale k as a state.
+The reading stays in pixels: dividing by a noisy distance first would correlate it with the range finder and make its
+noise depend on speed.
+
+Source: Longuet-Higgins and Prazdny (1980), eq. 2.7-2.8, on the image axes.
 """
 
 from __future__ import annotations
@@ -18,6 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.models.faces import GRAZING
 from axialnav.models.jit import Integer, kernel
 from axialnav.models.ray import distance_along_ray
 from axialnav.models.state import (
@@ -50,45 +57,45 @@ def pixel_motion(
     offset_is_state: bool,
     focal_window: Array,
     axis: Integer,
+    slope: float,
     H: Array,
     work: Array,
 ) -> float:
-    """Predict the displacement [px] along image axis 0 (x) or 1 (y) and write its Jacobian row into ``H`` (18,).
+    """Predict the displacement [px] along image axis 0 (x) or 1 (y) and write its Jacobian row into ``H`` (25,).
 
-    ``focal_window`` (2,) is focal length times window [px s] per image axis; ``work`` (8,) is scratch.  Returns NaN
-    where the optical axis does not meet the surface (blind, not wrong).
+    The place in the image is on that axis, where the ray has this ``slope`` against the optical axis.
+    ``focal_window`` (2,) is focal length times window [px s] per image axis; ``work`` (11,) is scratch.  Returns NaN
+    where the ray does not meet the surface (blind, not wrong).
     """
-    if not distance_along_ray(p_W, R_WB, lever_B, R_BS[:, 2], normal_W, offset_m, work) > MIN_COSINE:
+    ray_B = work[8:11]
+    ray_B[0], ray_B[1], ray_B[2] = _mixed(R_BS, 2, axis, slope)
+    limit = MIN_COSINE if slope == 0.0 else GRAZING
+    if not distance_along_ray(p_W, R_WB, lever_B, ray_B, normal_W, offset_m, work) > limit:
         return np.nan
     distance = work[0]
     if distance < MIN_DISTANCE_M:
         return np.nan
     # image x sees rotation about sensor y, image y the opposite rotation about sensor x
-    along = R_BS[:, axis]
+    a0, a1, a2 = _mixed(R_BS, axis, 2, -slope)
     about = R_BS[:, 1 - axis]
-    turn = 1.0 - 2.0 * axis
-    v0 = R_WB[0, 0] * x[VEL] + R_WB[1, 0] * x[VEL + 1] + R_WB[2, 0] * x[VEL + 2]
-    v1 = R_WB[0, 1] * x[VEL] + R_WB[1, 1] * x[VEL + 1] + R_WB[2, 1] * x[VEL + 2]
-    v2 = R_WB[0, 2] * x[VEL] + R_WB[1, 2] * x[VEL + 1] + R_WB[2, 2] * x[VEL + 2]
-    w0 = gyro_rad_s[0] - x[GYRO_BIAS]
-    w1 = gyro_rad_s[1] - x[GYRO_BIAS + 1]
-    w2 = gyro_rad_s[2] - x[GYRO_BIAS + 2]
-    # (lever x along) appears both in the speed of the camera and in its derivative by the gyro bias
-    l0 = lever_B[1] * along[2] - lever_B[2] * along[1]
-    l1 = lever_B[2] * along[0] - lever_B[0] * along[2]
-    l2 = lever_B[0] * along[1] - lever_B[1] * along[0]
-    speed = along[0] * v0 + along[1] * v1 + along[2] * v2 + w0 * l0 + w1 * l1 + w2 * l2
+    turn = (1.0 - 2.0 * axis) * (1.0 + slope * slope)
+    v0, v1, v2 = _in_body(R_WB, x[VEL], x[VEL + 1], x[VEL + 2])
+    w0, w1, w2 = gyro_rad_s[0] - x[GYRO_BIAS], gyro_rad_s[1] - x[GYRO_BIAS + 1], gyro_rad_s[2] - x[GYRO_BIAS + 2]
+    # (lever x a) appears both in the speed of the camera and in its derivative by the gyro bias
+    l0, l1, l2 = _cross(lever_B[0], lever_B[1], lever_B[2], a0, a1, a2)
+    speed = a0 * v0 + a1 * v1 + a2 * v2 + w0 * l0 + w1 * l1 + w2 * l2
     rate = about[0] * w0 + about[1] * w1 + about[2] * w2
     gain = focal_window[axis] * (1.0 + x[BLUR_SCALE])
     per_speed = -gain / distance
     per_distance = gain * speed / (distance * distance)
     for i in range(3):
         H[E_POS + i] = per_distance * work[1 + i]
-        H[E_VEL + i] = per_speed * (R_WB[i, 0] * along[0] + R_WB[i, 1] * along[1] + R_WB[i, 2] * along[2])
+        H[E_VEL + i] = per_speed * (R_WB[i, 0] * a0 + R_WB[i, 1] * a1 + R_WB[i, 2] * a2)
         H[E_ATT + i] = per_distance * work[4 + i]
-    H[E_ATT] += per_speed * (along[1] * v2 - along[2] * v1)
-    H[E_ATT + 1] += per_speed * (along[2] * v0 - along[0] * v2)
-    H[E_ATT + 2] += per_speed * (along[0] * v1 - along[1] * v0)
+    t0, t1, t2 = _cross(a0, a1, a2, v0, v1, v2)
+    H[E_ATT] += per_speed * t0
+    H[E_ATT + 1] += per_speed * t1
+    H[E_ATT + 2] += per_speed * t2
     H[E_GYRO_BIAS] = -per_speed * l0 + gain * turn * about[0]
     H[E_GYRO_BIAS + 1] = -per_speed * l1 + gain * turn * about[1]
     H[E_GYRO_BIAS + 2] = -per_speed * l2 + gain * turn * about[2]
@@ -97,3 +104,28 @@ def pixel_motion(
     if offset_is_state:
         H[E_WALL_OFFSET] = per_distance * work[7]
     return float(flow)
+
+
+@kernel
+def _mixed(R_BS: Array, first: Integer, second: Integer, share: float) -> tuple[float, float, float]:
+    """One of a sensor's axes plus a share of another, body coordinates."""
+    return (
+        R_BS[0, first] + share * R_BS[0, second],
+        R_BS[1, first] + share * R_BS[1, second],
+        R_BS[2, first] + share * R_BS[2, second],
+    )
+
+
+@kernel
+def _in_body(R_WB: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Body coordinates of a world vector."""
+    return (
+        R_WB[0, 0] * x + R_WB[1, 0] * y + R_WB[2, 0] * z,
+        R_WB[0, 1] * x + R_WB[1, 1] * y + R_WB[2, 1] * z,
+        R_WB[0, 2] * x + R_WB[1, 2] * y + R_WB[2, 2] * z,
+    )
+
+
+@kernel
+def _cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.paths import place_of
+from axialnav.fusion.kernels.picture import look_at_surface, motion_at_slope, motion_of_picture
 from axialnav.fusion.kernels.window import state_in_window
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
-from axialnav.models.faces import nearest_face
-from axialnav.models.jit import Integer, Record, kernel
-from axialnav.models.pixel_motion import pixel_motion
-from axialnav.models.state import E_VEL, N_ERROR, WALL_OFFSET
+from axialnav.models.jit import Record, kernel
+from axialnav.models.state import E_VEL, N_ERROR
 from axialnav.models.uwb import uwb_position, uwb_range, uwb_tdoa
 from axialnav.models.wall_range import wall_range
 
@@ -89,30 +88,11 @@ def variance_of(claimed_sigma: float, floor_sigma: float) -> float:
 
 
 @kernel
-def _look_at_surface(s: Record, x: Array, w: Record) -> bool:
-    """Write the plane in view: its normal into ``w.normal``, offset and roughness [m] into ``w.plane``."""
-    if s.n_faces == 0:
-        for i in range(3):
-            w.normal[i] = s.normal_W[i]
-        w.plane[0] = x[WALL_OFFSET] if s.offset_is_state else s.offset_m
-        w.plane[1] = 0.0
-        return True
-    face = nearest_face(s.faces, s.n_faces, w.p, w.R, s.lever_B, s.R_BS[:, 2], w.ray)
-    if face < 0:
-        return False
-    for i in range(3):
-        w.normal[i] = s.faces[face, i]
-    w.plane[0] = s.faces[face, 3]
-    w.plane[1] = s.faces[face, 10]
-    return True
-
-
-@kernel
 def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
     w.z[0] = values[0]
     if not s.low <= values[0] <= s.high:
         return -OUT_OF_RANGE
-    if not _look_at_surface(s, x, w):
+    if not look_at_surface(s, x, np.int64(0), 0.0, w):
         return -NO_GEOMETRY
     w.h[0] = wall_range(w.p, w.R, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state, w.H[0], w.ray)
     w.variance[0] = variance_of(values[1], s.sigma) + w.plane[1] ** 2
@@ -180,18 +160,6 @@ def _measure_fix(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m:
 
 
 @kernel
-def _pixel_motion(s: Record, window_s: float, axis: Integer, w: Record) -> float:
-    for i in range(2):
-        w.focal_window[i] = s.focal_px[i] * window_s
-    if not _look_at_surface(s, w.x, w):
-        return np.nan
-    return pixel_motion(
-        w.x, w.p, w.R, w.rate, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state,
-        w.focal_window, axis, w.H[axis], w.ray,
-    )  # fmt: skip
-
-
-@kernel
 def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, m: Record, w: Record) -> int:
     if values[4] < s.low:
         return -WEAK_SIGNAL
@@ -201,8 +169,8 @@ def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, m: Record, w: R
     state_in_window(t_ns, values[0], x, m, w)
     for i in range(axes):
         w.z[i] = values[1 + i]
-        w.h[i] = _pixel_motion(s, values[0], i, w)
         w.variance[i] = values[3] ** 2 if np.isfinite(values[3]) else s.sigma**2
+        w.h[i] = motion_of_picture(s, values[0], i, w)
     return axes if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
@@ -210,7 +178,7 @@ def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, m: Record, w: R
 def _measure_blur(t_ns: int, s: Record, values: Array, x: Array, P: Array, m: Record, w: Record) -> int:
     """Unsigned length: usable only while the direction of motion is known and the blur is long enough to see."""
     state_in_window(t_ns, values[0], x, m, w)
-    signed = _pixel_motion(s, values[0], np.int64(0), w)  # a literal 0 would compile the model once more
+    signed = motion_at_slope(s, values[0], np.int64(0), 0.0, w)  # a literal 0 would compile the model once more
     if not np.isfinite(signed):
         return -NO_GEOMETRY
     spread = 0.0

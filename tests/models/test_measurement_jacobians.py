@@ -34,12 +34,25 @@ class Model:
     predict: Callable[[Array, Array, Array], float]
 
 
-def flow(axis: int, lever: Array, offset_is_state: bool) -> Callable[[Array, Array, Array], float]:
+def flow(axis: int, lever: Array, offset_is_state: bool, slope: float = 0.0) -> Callable[[Array, Array, Array], float]:
     def predict(x: Array, R: Array, H: Array) -> float:
         offset = x[WALL_OFFSET] if offset_is_state else -0.2
         focal_window = np.array([5.2, 4.1])
         return pixel_motion(
-            x, x[:3], R, GYRO, DOWN_BS, lever, FLOOR_W, offset, offset_is_state, focal_window, axis, H, np.empty(8)
+            x,
+            x[:3],
+            R,
+            GYRO,
+            DOWN_BS,
+            lever,
+            FLOOR_W,
+            offset,
+            offset_is_state,
+            focal_window,
+            axis,
+            slope,
+            H,
+            np.empty(11),
         )
 
     return predict
@@ -64,6 +77,7 @@ ZERO = np.zeros(3)
 MODELS = [
     *(Model(f"flow {'xy'[a]}, offset {'state' if o else 'known'}, {'lever' if lv.any() else 'centre'}", flow(a, lv, o))
       for a in (0, 1) for lv in (ZERO, LEVER_B) for o in (False, True)),
+    *(Model(f"flow {'xy'[a]} beside the optical axis", flow(a, LEVER_B, True, 0.4)) for a in (0, 1)),
     Model("blur length", blur_length),
     *(Model(f"range, offset {'state' if o else 'known'}, {'lever' if lv.any() else 'centre'}", distance(lv, o))
       for lv in (ZERO, LEVER_B) for o in (False, True)),

@@ -20,10 +20,10 @@ NONE = np.zeros(3)
 FOCAL_PX, WINDOW_S, WALL_Y_M = 600.0, 0.01, 2.0
 
 
-def flow(x, gyro=(0.0, 0.0, 0.0), lever=NONE, axis=0, R_BS=LEFT_BS):
+def flow(x, gyro=(0.0, 0.0, 0.0), lever=NONE, axis=0, R_BS=LEFT_BS, slope=0.0):
     return pixel_motion(
         x, x[:3], rotation_of(x).as_matrix(), np.array(gyro), R_BS, np.array(lever), WALL_W, -WALL_Y_M,
-        False, np.full(2, FOCAL_PX * WINDOW_S), axis, np.zeros(N_ERROR), np.empty(8),
+        False, np.full(2, FOCAL_PX * WINDOW_S), axis, slope, np.zeros(N_ERROR), np.empty(11),
     )  # fmt: skip
 
 
@@ -79,6 +79,25 @@ def test_predicted_motion_is_that_of_a_wall_point_in_a_pinhole_image() -> None:
         seen = later[:2] / later[2] * FOCAL_PX * WINDOW_S / dt
         for axis in (0, 1):
             assert flow(x, gyro, lever, axis) == pytest.approx(seen[axis], abs=1e-3)
+
+
+@pytest.mark.parametrize("slope", [-0.6, 0.35])
+def test_beside_the_optical_axis_too(slope: float) -> None:
+    """The same with a point that is seen on the image's x axis, a slope away from its centre."""
+    rng, dt = np.random.default_rng(32), 1e-6
+    for _ in range(30):
+        x = random_state(rng, tilt_rad=0.2)
+        x[1] = rng.uniform(-1, 1)
+        attitude = Rotation.from_euler("ZYX", rng.uniform(-0.3, 0.3, 3))
+        x[6:10] = attitude.as_quat(scalar_first=True)
+        x[10:13], x[16] = 0.0, 0.0
+        gyro = rng.normal(0, 0.8, 3)
+        ray_W = attitude.apply(LEFT_BS[:, 2] + slope * LEFT_BS[:, 0])
+        point = x[:3] + ray_W * (WALL_Y_M - x[1]) / ray_W[1]
+        turned = attitude * Rotation.from_rotvec(gyro * dt)
+        later = LEFT_BS.T @ turned.inv().apply(point - x[:3] - x[3:6] * dt)
+        seen = (later[0] / later[2] - slope) * FOCAL_PX * WINDOW_S / dt
+        assert flow(x, gyro, slope=slope) == pytest.approx(seen, abs=1e-3)
 
 
 def test_a_camera_that_does_not_face_the_wall_sees_nothing() -> None:

@@ -1,0 +1,113 @@
+r"""What a camera's picture says of its motion as a whole: its columns do not all move alike.
+
+Rotation moves the rim of a wide picture more than its middle, a wall seen at an angle moves less where it is farther
+away, and in a corner two walls are in view.  An estimator that aligns frames follows the columns that move alike and
+lets go of those that leave them by more than the texture's coherence.  The prediction does the same with the motions
+:math:`u_k` of some columns,
+
+.. math::
+    u = \frac{\sum_k g_k u_k}{\sum_k g_k}, \qquad g_k = \exp \left( -\frac{(u_k - u)^2}{2 s^2} \right)
+
+solved from the middle column outwards.  How far the columns in use are apart is how little such a mean can be trusted.
+
+Source: location by weighted means as in Huber and Ronchetti, Robust Statistics (2009), section 4.8, with Welsch's
+weight; coherence s and the share of the spread were measured on rendered turns (docs/filter/pixel-motion.md).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axialnav.fusion.memory import COLUMNS
+from axialnav.models.faces import nearest_face
+from axialnav.models.jit import Integer, Record, kernel
+from axialnav.models.pixel_motion import pixel_motion
+from axialnav.models.state import N_ERROR, WALL_OFFSET
+
+Array = NDArray[np.float64]
+ROUNDS = 6
+SPREAD_SHARE = 0.5
+
+
+@kernel
+def look_at_surface(s: Record, x: Array, axis: Integer, slope: float, w: Record) -> bool:
+    """Write the plane in view: its normal into ``w.normal``, offset and roughness [m] into ``w.plane``.
+
+    It is looked for along the ray with this slope along an image axis, which is written into ``w.look``.
+    """
+    for i in range(3):
+        w.look[i] = s.R_BS[i, 2] + slope * s.R_BS[i, axis]
+    if s.n_faces == 0:
+        for i in range(3):
+            w.normal[i] = s.normal_W[i]
+        w.plane[0] = x[WALL_OFFSET] if s.offset_is_state else s.offset_m
+        w.plane[1] = 0.0
+        return True
+    face = nearest_face(s.faces, s.n_faces, w.p, w.R, s.lever_B, w.look, w.ray)
+    if face < 0:
+        return False
+    for i in range(3):
+        w.normal[i] = s.faces[face, i]
+    w.plane[0] = s.faces[face, 3]
+    w.plane[1] = s.faces[face, 10]
+    return True
+
+
+@kernel
+def motion_at_slope(s: Record, window_s: float, axis: Integer, slope: float, w: Record) -> float:
+    """Predict the motion [px] along an image axis at one place on that axis; its Jacobian row into ``w.H[axis]``."""
+    for i in range(2):
+        w.focal_window[i] = s.focal_px[i] * window_s
+    if not look_at_surface(s, w.x, axis, slope, w):
+        return np.nan
+    return pixel_motion(
+        w.x, w.p, w.R, w.rate, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state,
+        w.focal_window, axis, slope, w.H[axis], w.ray,
+    )  # fmt: skip
+
+
+@kernel
+def motion_of_picture(s: Record, window_s: float, axis: Integer, w: Record) -> float:
+    """Predict the motion [px] of the whole picture, its Jacobian row, and add to ``w.variance[axis]`` for its spread.
+
+    Sensors without a width (flow chips, blur meters) are compared with their optical axis.
+    """
+    middle = COLUMNS // 2
+    centre = motion_at_slope(s, window_s, axis, 0.0, w)
+    if s.half_view == 0.0 or not np.isfinite(centre):
+        return centre
+    for k in range(COLUMNS):
+        slope = s.half_view * (2.0 * k - (COLUMNS - 1)) / COLUMNS
+        w.column[k] = motion_at_slope(s, window_s, axis, slope, w) if k != middle else centre
+        for i in range(N_ERROR):
+            w.column_H[k, i] = w.H[axis, i]
+    motion, variance = _together(s.coherence_px, centre, w)
+    for i in range(N_ERROR):
+        w.H[axis, i] = 0.0
+        for k in range(COLUMNS):
+            w.H[axis, i] += w.weight[k] * w.column_H[k, i]
+    w.variance[axis] += SPREAD_SHARE**2 * variance
+    return motion
+
+
+@kernel
+def _together(coherence_px: float, start: float, w: Record) -> tuple[float, float]:
+    """Motion [px] of the columns that move alike and the variance among them; weights of sum 1 into ``w.weight``."""
+    motion, spread = start, 0.0
+    for _ in range(ROUNDS):
+        total, first, second = 0.0, 0.0, 0.0
+        for k in range(COLUMNS):
+            apart = w.column[k] - motion
+            w.weight[k] = math.exp(-0.5 * (apart / coherence_px) ** 2) if np.isfinite(apart) else 0.0
+            if w.weight[k] > 0.0:
+                total += w.weight[k]
+                first += w.weight[k] * apart
+                second += w.weight[k] * apart * apart
+        motion += first / total
+        spread = second / total
+    for k in range(COLUMNS):
+        w.weight[k] /= total
+    return motion, spread
