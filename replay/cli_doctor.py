@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Flag = Annotated[bool, Parameter(negative=())]
 
 
-def doctor(log: Path, /, *, json: Flag = False) -> int:
+def doctor(log: Path, /, *, json: Flag = False, mapping: Path | None = None) -> int:
     """Look at a recording: what is in it, what is wrong with it, and what to repair first.
 
     Exit code 0: nothing, or only remarks. 1: something would spoil a replay. 3: no replay is possible.
@@ -27,11 +27,13 @@ def doctor(log: Path, /, *, json: Flag = False) -> int:
         Flight folder, or any log that `replay` takes.
     json
         Print JSON instead of the tables.
+    mapping
+        TOML file that says which topics and fields of the log are which sensor.
     """
     from axialnav.replay.doctor import Gravity, diagnose
     from axialnav.replay.flight import load_flight
 
-    flight = load_flight(log)
+    flight = load_flight(log, mapping=mapping)
     symptoms = diagnose(flight)
     emit(_as_json(flight, symptoms) if json else "\n".join(_as_table(flight, symptoms)))
     worst = min((symptom.gravity for symptom in symptoms), default=Gravity.LOOK)

@@ -27,11 +27,11 @@ def replay(
     smooth: Annotated[bool, Parameter(negative=())] = False,
     param: Names = None,
     mapping: Path | None = None,
+    viewer: Annotated[bool, Parameter(negative=())] = False,
 ) -> int:
     """Run the filter over a recorded flight, print the table and write the run folder.
 
-    A flight without a reference is replayed too: the scores say NOT_EVALUATED and the exit code stays 0, because the
-    replay itself was done. Exit code 3 means that nothing could be replayed.
+    A flight without a reference is replayed too: the scores say NOT_EVALUATED and the exit code stays 0.
 
     Parameters
     ----------
@@ -52,11 +52,14 @@ def replay(
         One setting as NAME=VALUE, e.g. uwb.sigma_m=0.4; may be repeated.
     mapping
         TOML file that says which topics and fields of the log are which sensor.
+    viewer
+        Also write recording.rrd for the Rerun viewer; needs the extra viewer.
     """
     from axialnav.fusion.config import Config
     from axialnav.replay.flight import load_flight
     from axialnav.replay.run import replay as run_replay
 
+    _require_viewer(viewer)
     params = dict(map(_parameter, param or ()))
     settings = Config.from_toml(config) if config else None
     flight = load_flight(log, mapping=mapping)
@@ -72,7 +75,7 @@ def replay(
             smooth=smooth,
             progress=progress,
         )
-    return _finish(run, folder)
+    return _finish(run, folder, viewer=viewer)
 
 
 def demo(*, out: Path = Path("runs/demo")) -> int:
@@ -102,12 +105,26 @@ def demo(*, out: Path = Path("runs/demo")) -> int:
     return EXIT_CODES[overall]
 
 
-def _finish(run: Run, folder: Path) -> int:
+def _finish(run: Run, folder: Path, *, viewer: bool = False) -> int:
     """Write everything first, then print: the files are there even when nobody reads the table."""
+    from axialnav.replay.viewer import RECORDING, write_recording
+
     run.write(folder)
+    if viewer:
+        write_recording(run, folder / RECORDING)
     emit(run.table)
     emit(f"report     {folder / 'report.html'}")
+    if viewer:
+        emit(f"viewer     rerun {folder / RECORDING}")
     return 0
+
+
+def _require_viewer(wanted: bool) -> None:
+    """Say that the viewer's package is missing before any work is done."""
+    from axialnav.replay.viewer import rerun_module
+
+    if wanted:
+        rerun_module()
 
 
 def _names(lists: list[str] | None) -> tuple[str, ...]:

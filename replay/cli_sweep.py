@@ -24,6 +24,7 @@ def sweep(
     config: Path | None = None,
     without: Names = None,
     estimator: str = "corridor",
+    mapping: Path | None = None,
 ) -> int:
     """Replay many flights with many settings, on this machine or on a Dask cluster.
 
@@ -49,6 +50,8 @@ def sweep(
         Sensors to switch off, separated by commas.
     estimator
         Which filter: corridor or axial.
+    mapping
+        TOML file that says which topics and fields of the logs are which sensor; for logs of one kind.
     """
     from axialnav.fusion.config import Config
     from axialnav.replay.run import ESTIMATORS
@@ -63,7 +66,7 @@ def sweep(
         raise ConfigError(f"no estimator named {estimator!r}; there are {', '.join(ESTIMATORS)}")
     text = Config.from_toml(config).to_toml() if config else None
     names = [name.strip() for item in without or () for name in item.split(",") if name.strip()]
-    jobs = plan(logs, grid, config_text=text, without=names, estimator=estimator)
+    jobs = plan(logs, grid, config_text=text, without=names, estimator=estimator, mapping=mapping)
     with progress_bar("sweep") as progress:
         done = run_sweep(jobs, out, workers=workers or os.cpu_count() or 1, scheduler=scheduler, progress=progress)
     write_text(out / "summary.html", sweep_page(done.rows))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,6 +26,7 @@ def tune(
     config: Path | None = None,
     hold_out: Paths = None,
     workers: int | None = None,
+    mapping: Path | None = None,
 ) -> int:
     """Find the noise settings under which the innovations of recorded flights are most likely.
 
@@ -46,6 +48,8 @@ def tune(
         A flight that is only scored, before and after; may be repeated.
     workers
         Replays at a time; the number of cores if not given.
+    mapping
+        TOML file that says which topics and fields of the logs are which sensor; for logs of one kind.
     """
     from axialnav.fusion.config import Config
     from axialnav.replay.tuning.tune import tune as run_tune
@@ -58,7 +62,7 @@ def tune(
     refuse_inputs(out, (config,))
     start = Config.from_toml(config) if config else None
     names = [name.strip() for item in free or () for name in item.split(",") if name.strip()]
-    flights, held = _load(logs), _load(hold_out or ())
+    flights, held = load_all(logs, mapping), load_all(hold_out or (), mapping)
     with progress_bar("tune") as progress:
         tuning = run_tune(
             flights, start, free=names, hold_out=held, workers=workers or os.cpu_count() or 1, progress=progress
@@ -69,10 +73,11 @@ def tune(
     return 0
 
 
-def _load(paths: tuple[Path, ...] | list[Path]) -> list[Flight]:
+def load_all(paths: Sequence[Path], mapping: Path | None) -> list[Flight]:
+    """Recordings, all read with the same mapping."""
     from axialnav.replay.flight import load_flight
 
-    return [load_flight(path) for path in paths]
+    return [load_flight(path, mapping=mapping) for path in paths]
 
 
 def refuse_inputs(out: Path, inputs: tuple[Path | None, ...]) -> None:

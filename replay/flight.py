@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.config import Config
 from axialnav.fusion.readings import Reading
 from axialnav.models.rig import Uwb
+from axialnav.replay.inputs import InputFile, input_files
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -68,6 +70,11 @@ class SensorTable:
 
     def __len__(self) -> int:
         return len(self.t_ns)
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether these are displacements of the image, also where the sensor is a camera that measured on board."""
+        return "dx_px" in self.columns
 
     def renumbered(self, anchors: tuple[str, ...]) -> SensorTable:
         """The same UWB rows with index columns that refer to another list of anchors.
@@ -167,6 +174,11 @@ class Flight:
         from axialnav.replay.flight_readings import merge_readings
 
         return merge_readings(self)
+
+    @cached_property
+    def inputs(self) -> tuple[InputFile, ...]:
+        """The files of the recording with their hashes; read once, when first asked for."""
+        return input_files(self)
 
     def tables_for(self, config: Config) -> dict[str, SensorTable]:
         """Tables whose anchor columns refer to the anchors of ``config``, which may differ from the flight's own."""

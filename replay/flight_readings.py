@@ -52,7 +52,8 @@ def _merged(flight: Flight, names: Iterable[str]) -> Iterator[Reading]:
             makers.append(_maker(kind, name, flight.tables[name]))
             stamps.append(flight.tables[name].t_ns)
         elif isinstance(flight.config.sensor[name], Camera) and name in flight.tables:
-            makers.append(_frame_maker(flight, name))
+            table = flight.tables[name]
+            makers.append(_maker(PixelMotion, name, table) if table.is_motion else _frame_maker(flight, name))
             stamps.append(flight.tables[name].t_ns)
     if not stamps:
         return

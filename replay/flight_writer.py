@@ -65,6 +65,11 @@ def _write(flight: Flight, folder: Path) -> None:
             table = flight.tables[name]
         else:
             continue
+        if isinstance(spec, Camera) and table.is_motion:
+            raise FlightError(
+                f"{name} holds image motion measured on board, for which a flight folder has no form; "
+                f"convert to MCAP, or keep the recording as it is"
+            )
         place.mkdir(exist_ok=True)
         (place / "sensor.yaml").write_text(_sensor_yaml(spec), encoding="utf-8")
         _write_csv(place / "data.csv", layout_of(spec), *_as_in_file(spec, table))

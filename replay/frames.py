@@ -15,10 +15,14 @@ from axialnav.replay.flight import Flight, SensorTable
 
 
 def with_pixel_motion(flight: Flight, config: Config, tables: Mapping[str, SensorTable]) -> dict[str, SensorTable]:
-    """Copy of ``tables`` in which cameras that look at a surface carry pixel motion instead of file names."""
+    """Copy of ``tables`` in which cameras that look at a surface carry pixel motion instead of file names.
+
+    Cameras of a recording made on board do already: what was fused in flight was measured there.
+    """
     out = dict(tables)
     for name, spec in config.sensor.items():
-        if isinstance(spec, Camera) and spec.surface is not None and name in out and name not in config.disabled:
+        used = isinstance(spec, Camera) and spec.surface is not None and name in out and name not in config.disabled
+        if used and not out[name].is_motion:
             out[name] = motion_table(flight, name, config)
     return out
 

@@ -15,7 +15,7 @@ from axialnav.estimators.estimate import MotionEstimate, MotionEstimator
 from axialnav.estimators.pictures import read_picture, read_video
 from axialnav.fusion.errors import FlightError
 from axialnav.models.rig import Camera
-from axialnav.replay.flight import Flight
+from axialnav.replay.flight import Flight, SensorTable
 from axialnav.replay.motion_truth import TrueMotion, knows_distance, true_motion
 
 Array = NDArray[np.float64]
@@ -110,14 +110,7 @@ def run_motion(
     FlightError
         If the flight has no such camera or too few frames.
     """
-    spec = flight.config.sensor.get(camera)
-    table = flight.tables.get(camera)
-    if not isinstance(spec, Camera) or table is None:
-        raise FlightError(
-            f"flight {flight.name} has no camera {camera!r}; it has {', '.join(flight.tables) or 'nothing'}"
-        )
-    if len(table) < frames:
-        raise FlightError(f"{camera} of flight {flight.name} holds {len(table)} frames, {frames} are needed")
+    spec, table = _camera(flight, camera, frames)
     straight = spec.surface is not None if undistort is None else undistort
     knows_distance(flight, spec, distance_m)
     estimator = MotionEstimator(spec, frames, method, axis=axis, undistort=straight)
@@ -135,6 +128,21 @@ def run_motion(
     window_s = np.maximum((frames - 1) * period_s, 0.0)
     truth = true_motion(flight, camera, middle, window_s, period_s, distance_m, axis)
     return MotionRun(flight.name, camera, method, frames, len(table), straight, tuple(estimates), period_s, truth)
+
+
+def _camera(flight: Flight, camera: str, frames: int) -> tuple[Camera, SensorTable]:
+    """Description and table of a camera that has enough pictures."""
+    spec = flight.config.sensor.get(camera)
+    table = flight.tables.get(camera)
+    if not isinstance(spec, Camera) or table is None:
+        raise FlightError(
+            f"flight {flight.name} has no camera {camera!r}; it has {', '.join(flight.tables) or 'nothing'}"
+        )
+    if table.is_motion:
+        raise FlightError(f"{camera} of flight {flight.name} holds motion measured on board, not pictures")
+    if len(table) < frames:
+        raise FlightError(f"{camera} of flight {flight.name} holds {len(table)} frames, {frames} are needed")
+    return spec, table
 
 
 def pictures(flight: Flight, camera: str, start: int = 0) -> Iterator[NDArray[np.generic]]:

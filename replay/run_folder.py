@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +38,9 @@ def write_run_folder(run: Run, folder: str | Path) -> Path:
         write_fused_csv(out / "fused.csv", run.columns)
         write_innovations(out / "innovations.parquet", run.log)
         (out / REPORT).write_text(render_report(run), encoding="utf-8")
-        (out / "metrics.json").write_text(metrics_text(run.metrics), encoding="utf-8")
+        (out / "metrics.json").write_text(
+            metrics_text({**run.metrics, "inputs": [asdict(one) for one in run.flight.inputs]}), encoding="utf-8"
+        )
     except OSError as error:
         why = error.strerror or str(error)
         raise ConfigError(f"run folder {out}: cannot be written ({why}); choose another with --out") from None

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from axialnav.replay.findings import nees_verdict
+from axialnav.replay.inputs import combined
 from axialnav.replay.rates import sensor_rates
 from axialnav.replay.settings import changed_settings
 
@@ -24,7 +25,15 @@ WHY_NOT = {
 
 def summary(run: Run) -> str:
     """Settings, sensors, verdicts per sensor, scores with their coverage, and the digest; one line a topic."""
-    lines = [*_settings(run), *_flight(run), *_dropped(run), _speed(run.metrics), *_sensors(run.metrics), *_scores(run)]
+    lines = [
+        *_settings(run),
+        *_flight(run),
+        *_inputs(run),
+        *_dropped(run),
+        _speed(run.metrics),
+        *_sensors(run.metrics),
+        *_scores(run),
+    ]
     return "\n".join([*lines, *_condition(run.metrics), f"digest     {run.metrics['digest'][:16]}"])
 
 
@@ -45,6 +54,17 @@ def _flight(run: Run) -> Iterator[str]:
     gaps = [f"{r.name} {r.gaps} (max {r.longest_s:.1f} s at {r.longest_at_s:.1f} s)" for r in rates if r.gaps]
     if gaps:
         yield f"gaps       {', '.join(gaps)}"
+
+
+def _inputs(run: Run) -> Iterator[str]:
+    files = run.flight.inputs
+    if files:
+        size = sum(one.bytes for one in files) / 1e6
+        yield f"input      {_counted(len(files), 'file')}, {size:.1f} MB, SHA-256 {combined(files)[:16]}"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{_count(count)} {noun}{'s' * (count != 1)}"
 
 
 def _dropped(run: Run) -> Iterator[str]:

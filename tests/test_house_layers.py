@@ -26,7 +26,13 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "cyclopts": ("replay/",),
     "pyarrow": ("replay/",),
 }
-DISTRIBUTION = {"cv2": "opencv-python-headless", "distributed": "dask", "serial": "pyserial", "yaml": "pyyaml"}
+DISTRIBUTION = {
+    "cv2": "opencv-python-headless",
+    "distributed": "dask",
+    "rerun": "rerun-sdk",
+    "serial": "pyserial",
+    "yaml": "pyyaml",
+}
 
 
 def test_the_layers_import_only_downwards() -> None:
@@ -59,7 +65,12 @@ def test_every_imported_library_is_declared(layer: str) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     requirements = [
         *project["dependencies"],
-        *(r for extra in ("replay", "cluster") if layer == "replay" for r in project["optional-dependencies"][extra]),
+        *(
+            r
+            for extra in ("replay", "cluster", "viewer")
+            if layer == "replay"
+            for r in project["optional-dependencies"][extra]
+        ),
     ]
     declared = {re.split(r"[^A-Za-z0-9_.-]", r)[0].lower() for r in requirements}
     known = declared | set(sys.stdlib_module_names) | {"axialnav"}

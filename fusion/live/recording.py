@@ -13,7 +13,7 @@ from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.live.dialect import Message
 from axialnav.fusion.live.recorder.recorder import Recorder
-from axialnav.fusion.outcome import AxialState, Outcome
+from axialnav.fusion.outcome import AxialState, Outcome, Verdict
 from axialnav.fusion.readings import CameraFrame, ImuSample, Reading
 
 MAX_FILES = 10_000
@@ -62,9 +62,9 @@ class FlightRecording:
             self.problem = str(error)  # flying goes on without a recording
 
     def pushed(self, reading: Reading, outcome: Outcome, arrival_ns: int) -> None:
-        """Record a reading and what became of it."""
+        """Record a reading and what became of it; of inertial samples only that they came too late."""
         self._write(reading.sensor, arrival_ns, reading)
-        if not isinstance(reading, ImuSample):
+        if outcome.verdict is Verdict.LATE or not isinstance(reading, ImuSample):
             self._write(f"{reading.sensor}/outcome", arrival_ns, outcome)
 
     def frame(self, frame: CameraFrame, arrival_ns: int) -> None:

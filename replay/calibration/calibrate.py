@@ -107,7 +107,10 @@ def calibrate(
 
 
 def _is_known(delay: Delay) -> bool:
-    return delay.sigma_s is not None and not delay.at_edge and abs(delay.late_s) > SIGNIFICANT * delay.sigma_s
+    """Whether the shift was needed to explain the readings, and stands out of its error."""
+    if delay.sigma_s is None or delay.at_edge or delay.gain_nats <= 0.0:
+        return False
+    return abs(delay.late_s) > SIGNIFICANT * delay.sigma_s
 
 
 def _surface(config: Config, name: str) -> tuple[Array, float] | None:

@@ -58,7 +58,7 @@ def _delay(delay: Delay) -> str:
     if delay.sigma_s is None:
         return "not determined by this flight"
     edge = ", at the edge of the search: it may be more" if delay.at_edge else ""
-    gain = f"log-likelihood {delay.gain_nats:+.1f}"
+    gain = f"log-likelihood {delay.gain_nats:+.1f}" if delay.gain_nats else "not clear: left as it was"
     return f"stamps {1e3 * delay.late_s:+.1f} +- {1e3 * delay.sigma_s:.1f} ms late ({gain}){edge}"
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.live.recorder.cdr import Codec, Decoded
-from axialnav.fusion.live.recorder.messages import EXPOSURE, OWN, OWN_READINGS, value_fields
+from axialnav.fusion.live.recorder.messages import EXPOSURE, OUTCOME, OWN, OWN_READINGS, value_fields
+from axialnav.fusion.outcome import Verdict
 from axialnav.fusion.strict_toml import parse
 from axialnav.models.rig import Camera, Uwb
 from axialnav.replay.convert.messages import EVALUATION_KEYS, GPS_TOPIC, GPS_TYPE, TRUTH_TOPIC, TRUTH_TYPE
@@ -23,6 +24,7 @@ from axialnav.replay.readers.mcap_records import Payload, Topic
 from axialnav.replay.readers.pictures_inside import PictureMessage, stamps_of
 
 _OWN = {OWN + kind.__name__: kind for kind in OWN_READINGS}
+MOTION = OWN + "PixelMotion"
 ABOUT = ("source", "licence", "note")
 Columns = Mapping[str, NDArray[Any]]
 
@@ -60,10 +62,10 @@ def read_recorded(path: Path, topics: Sequence[Topic], about: Mapping[str, str],
         topic = by_name.get(name)
         if topic is None:
             continue
-        if isinstance(spec, Camera):
+        if isinstance(spec, Camera) and topic.type != MOTION:
             tables[name], frames[name] = _camera(topic, by_name.get(f"{name}/exposure"), path)
             continue
-        part = _part(topic, drops)
+        part = _part(topic, drops, _refused_as_late(by_name.get(f"{name}/outcome")))
         if part is not None:
             anchors = tuple(spec.anchors) if isinstance(spec, Uwb) else ()
             tables[name] = _table(part, anchors)
@@ -111,8 +113,23 @@ def stamps_ns(columns: Columns) -> Stamps | None:
     return None
 
 
-def _part(topic: Topic, drops: DropLog) -> _Part | None:
-    """Stamps and columns of a topic, keyed as the fields of its reading class, sorted by time."""
+def _refused_as_late(topic: Topic | None) -> frozenset[tuple[int, int]]:
+    """(arrival, stamp) of the readings that came too late for the filter in flight [ns]."""
+    decoded = decode_topic(topic, DropLog()) if topic is not None and topic.type == OUTCOME else None
+    if topic is None or decoded is None:
+        return frozenset()
+    stamps = stamps_ns(decoded.columns)
+    assert stamps is not None
+    late = np.flatnonzero(decoded.columns["verdict"] == int(Verdict.LATE))
+    arrival = np.asarray(topic.log_ns, dtype=np.int64)[decoded.message]
+    return frozenset(zip(arrival[late].tolist(), stamps[late].tolist(), strict=True))
+
+
+def _part(topic: Topic, drops: DropLog, late: frozenset[tuple[int, int]] = frozenset()) -> _Part | None:
+    """Stamps and columns of a topic, keyed as the fields of its reading class, sorted by time.
+
+    Readings in ``late`` are left out, as the filter did in flight: a replay must not know more than it did.
+    """
     decoded = decode_topic(topic, drops)
     if decoded is None:
         return None
@@ -122,6 +139,12 @@ def _part(topic: Topic, drops: DropLog) -> _Part | None:
         return None
     columns = _renamed(topic.type, decoded.columns)
     order = np.argsort(stamps, kind="stable")
+    if late:
+        arrival = np.asarray(topic.log_ns, dtype=np.int64)[decoded.message]
+        refused = np.array([pair in late for pair in zip(arrival.tolist(), stamps.tolist(), strict=True)])
+        example = f"stamp {stamps[refused][0]}" if refused.any() else ""
+        drops.add(topic.name, "came too late for the filter in flight: left out here too", refused.sum(), example)
+        order = order[~refused[order]]
     return _Part(stamps[order], {name: array[order] for name, array in columns.items()})
 
 

@@ -17,12 +17,26 @@ from axialnav.replay.report.sections import (
     settings,
     speed,
     strip,
+    supervisor,
     verdict,
     whiteness,
 )
 from axialnav.replay.run import Run
 
-SECTIONS = (verdict, axial, speed, strip, innovations, whiteness, frames, position, biases, settings, provenance)
+SECTIONS = (
+    verdict,
+    axial,
+    speed,
+    strip,
+    supervisor,
+    innovations,
+    whiteness,
+    frames,
+    position,
+    biases,
+    settings,
+    provenance,
+)
 TEMPLATES = Path(__file__).parent / "templates"
 
 

@@ -30,7 +30,9 @@ def _scores(job: Job) -> dict[str, Any]:
     from axialnav.replay.run import replay
 
     config = None if job.config is None else Config.from_dict(parse(job.config, where="--config"), where="--config")
-    run = replay(_flight(job.log), config, without=job.without, params=dict(job.params), estimator=job.estimator)
+    run = replay(
+        _flight(job.log, job.mapping), config, without=job.without, params=dict(job.params), estimator=job.estimator
+    )
     metrics = run.metrics
     axial = {f"axial_{key}": value for key, value in metrics["axial_velocity_m_s"].items()}
     sensors = {
@@ -54,6 +56,6 @@ def _scores(job: Job) -> dict[str, Any]:
 
 
 @functools.lru_cache(KEPT_FLIGHTS)
-def _flight(log: str) -> Flight:
+def _flight(log: str, mapping: str | None) -> Flight:
     """A recording stays in memory while its settings are varied; neighbouring jobs share it."""
-    return load_flight(log)
+    return load_flight(log, mapping=mapping)

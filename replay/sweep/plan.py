@@ -27,6 +27,7 @@ class Job:
     config: str | None
     without: tuple[str, ...]
     estimator: str
+    mapping: str | None = None
 
 
 def plan(
@@ -36,13 +37,14 @@ def plan(
     config_text: str | None = None,
     without: Sequence[str] = (),
     estimator: str = "corridor",
+    mapping: Path | None = None,
 ) -> list[Job]:
     """All jobs, recordings slowest.
 
     Raises
     ------
     ConfigError
-        No recording, or more than a hundred thousand replays.
+        No recording, more than a hundred thousand replays, or a mapping that cannot be read.
     """
     if not logs:
         raise ConfigError("sweep needs a flight or more, got none: axialnav sweep LOGS... [--param NAME=V1,V2,...]")
@@ -52,13 +54,22 @@ def plan(
             f"{len(logs)} flights times {len(combinations)} settings are {len(logs) * len(combinations)} replays, "
             f"the limit is {MAX_JOBS}; sweep fewer values at once"
         )
+    mapped = [] if mapping is None else [_text(mapping)]
+    place = None if mapping is None else str(mapping.resolve())
     jobs = []
     for log in dict.fromkeys(str(path.resolve()) for path in logs):
         for params in combinations:
-            what = [log, list(params), config_text, list(without), estimator]
+            what = [log, list(params), config_text, list(without), estimator, *mapped]
             key = hashlib.sha256(json.dumps(what).encode()).hexdigest()[:16]
-            jobs.append(Job(key, log, tuple(params), config_text, tuple(without), estimator))
+            jobs.append(Job(key, log, tuple(params), config_text, tuple(without), estimator, place))
     return jobs
+
+
+def _text(mapping: Path) -> str:
+    try:
+        return mapping.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"--mapping {mapping}: cannot be read: {error}") from None
 
 
 def parse_grid(texts: Sequence[str]) -> dict[str, list[str]]:

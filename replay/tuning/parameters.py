@@ -14,8 +14,9 @@ from axialnav.fusion.sources import Kind, kind_of
 from axialnav.models.rig import AnySensor, Flow, Uwb
 
 LEVER_FIELDS = {"lever_x_m": 3, "lever_y_m": 7, "lever_z_m": 11}
+DELAY = "delay.late_s."
 FACTOR = 100.0
-DELAY_BOUND_S, DELAY_SCALE_S = 0.6, 0.05
+DELAY_BOUND_S, DELAY_SCALE_S = 0.6, 0.2
 LEVER_BOUND_M, LEVER_SCALE_M = 0.5, 0.05
 OTHER_SCALE = 0.1
 
@@ -116,7 +117,7 @@ def parameter(config: Config, name: str, start: float | None = None) -> Paramete
     part = name.rpartition(".")[2]
     if part in LEVER_FIELDS:
         return Parameter(name, value, value - LEVER_BOUND_M, value + LEVER_BOUND_M, LEVER_SCALE_M)
-    if name.startswith("delay.late_s."):
+    if name.startswith(DELAY):
         return Parameter(name, value, value - DELAY_BOUND_S, value + DELAY_BOUND_S, DELAY_SCALE_S)
     if value > 0.0:
         return Parameter(name, value, value / FACTOR, value * FACTOR)
@@ -125,12 +126,16 @@ def parameter(config: Config, name: str, start: float | None = None) -> Paramete
 
 
 def default_names(config: Config, tables: Mapping[str, Table]) -> list[str]:
-    """Settings that are freed if nobody says which: the noise of what was read, accelerometer and its bias walk."""
+    """Settings that are freed if nobody says which: the noise of what was read, accelerometer and its bias walk.
+
+    Not that of barometers: their errors drift, every reading says what the one before said, and the likelihood, which
+    takes them as independent, would believe them far too much.
+    """
     names = ["imu.accel_noise_scale", "imu.accel_walk_scale"]
     for sensor, spec in config.sensor.items():
         kind = kind_of(spec)
         there = sensor in tables and len(tables[sensor].t_ns) and sensor not in config.disabled
-        if there and kind not in (None, Kind.IMU):
+        if there and kind not in (None, Kind.IMU, Kind.HEIGHT):
             names.append(_noise_name(sensor, spec, config))
     return list(dict.fromkeys(names))
 
@@ -146,7 +151,7 @@ def _noise_name(sensor: str, spec: AnySensor, config: Config) -> str:
     kind = kind_of(spec)
     if kind is Kind.ATTITUDE:
         return f"sensor.{sensor}.sigma_rad" if getattr(spec, "sigma_rad", None) else "attitude.sigma_rad"
-    return {Kind.RANGE: "range.sigma_m", Kind.HEIGHT: "height.sigma_m"}.get(kind or Kind.IMU, "flow.sigma_rad")
+    return "range.sigma_m" if kind is Kind.RANGE else "flow.sigma_rad"
 
 
 def freed(config: Config, tables: Mapping[str, Table], names: Sequence[str]) -> list[Parameter]:

@@ -17,8 +17,9 @@ from axialnav.replay.flight import Flight
 from axialnav.replay.frames import with_pixel_motion
 from axialnav.replay.run import replay, resolve
 from axialnav.replay.tuning.cost import Cost, Subject
-from axialnav.replay.tuning.optimise import Minimum, describe, minimise
+from axialnav.replay.tuning.optimise import Minimum, describe
 from axialnav.replay.tuning.parameters import Parameter, apply, freed
+from axialnav.replay.tuning.scoring import minimise
 
 Array = NDArray[np.float64]
 COARSE_S = 30.0
@@ -143,13 +144,14 @@ def _search(
         cost.refer_to(start)
         if not cost.readings:
             raise FlightError("no reading was compared with a prediction, so there is nothing to tune by")
-        start, _, spent = minimise(cost, start, bounds)
-        count += spent
+        start = minimise(cost, cost.expand, start, bounds).at
+        count += cost.replays
         if progress is not None:
             progress(0.3 + 0.5 * index)
     cost.refer_to(start)
+    before = cost.replays
     minimum = describe(cost, start, bounds)
-    return minimum, count + minimum.evaluations
+    return minimum, count + cost.replays - before
 
 
 def _tuned(parameter: Parameter, minimum: Minimum, index: int) -> Tuned:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config, Corridor, Initial
 from axialnav.fusion.outcome import Health, InnovationLog, Reason, Track, Verdict
+from axialnav.fusion.supervisor import SourceState
 from axialnav.models.rig import Imu, RangeFinder, Surface, Uwb
 from axialnav.models.state import N_ERROR
 from axialnav.replay.flight import Flight, SensorTable, Truth
@@ -70,7 +71,7 @@ def make_track(velocity_error: Array, position_error: Array | None = None, sigma
         sigma_error=np.full((count, N_ERROR), 0.01),
         flags=np.zeros(count, dtype=np.int64),
         resets=np.zeros(count, dtype=np.int64),
-        source_states=np.zeros((count, 0), dtype=np.int8),
+        source_states=np.full((count, 2), int(SourceState.OK), dtype=np.int8),
     )
 
 
@@ -131,6 +132,8 @@ def make_run(
     track = make_track(SIGMA_M_S * correlated_noise(count, 50.0, rng))
     track.flags[3000:3400] |= int(Health.DEAD_RECKONING)
     track.resets[3400:] = 1
+    track.source_states[3000:3300, 1] = int(SourceState.SUSPECT)
+    track.source_states[3300:3400, 1] = int(SourceState.REACQUIRE)
     log = make_log(track.t_ns, rng)
     config = make_config(initial=initial, corridor=corridor)
     flight = make_flight(track, log, config, make_truth(count) if truth else None)

@@ -46,6 +46,7 @@ def used(folder: Path, width: int, *flags: str) -> dict[str, Any]:
     told = re.search(r'<pre id="told">(.+?)</pre>', done.stdout, re.DOTALL)
     assert told is not None, "the probe did not come to its end"
     found: dict[str, Any] = json.loads(html_text.unescape(told[1]))
+    assert "error" not in found
     return found
 
 
@@ -67,6 +68,8 @@ def test_the_page_can_be_used(tmp_path: Path, width: int, flags: tuple[str, ...]
     assert all(span == found["after"][0] for span in found["after"])  # a zoom in one shows in all
 
     assert found["hidden"] >= 1  # a click on the legend
+    assert sorted(found["supervised"]) == ["tof0", "uwb0"]
+    assert found["colours"] >= 3  # ok, suspect and reacquired, as a person sees them
     assert "reference" in found["tip"]
     assert found["tipInside"]
     assert found["untold"] == 0  # cards and heads of columns explain themselves

@@ -14,6 +14,7 @@ from scipy import stats
 
 from axialnav.fusion.config import Config, Corridor, Section
 from axialnav.fusion.outcome import InnovationLog, Verdict
+from axialnav.fusion.supervisor import SOURCE_STATES, SourceState
 from axialnav.models.rig import BlurMeter, Camera, Flow
 from axialnav.replay.flight import SensorTable
 from axialnav.replay.image_velocity import image_velocities
@@ -23,7 +24,7 @@ from axialnav.replay.report.moments import moments
 from axialnav.replay.report.nis import chi_square_shares
 from axialnav.replay.report.page import render_report
 from axialnav.replay.report.png import png
-from axialnav.replay.report.sections import frames, strip
+from axialnav.replay.report.sections import frames, strip, supervisor
 from axialnav.replay.run import Run
 from tests.replay.made_runs import make_run
 
@@ -196,3 +197,31 @@ def test_ten_minutes_stay_small() -> None:
     wander = np.cumsum(np.random.default_rng(1).normal(0.0, 1e-3, (150_000, 8)), axis=0)
     run = replace(run, track=replace(run.track, uwb_bias_m=wander))
     assert len(render_report(run).encode()) < MAX_BYTES
+
+
+def test_the_supervisor_strip_says_what_it_made_of_each_source_and_where() -> None:
+    straight = Section(kind="straight", start=(-9.0, 0.0, 0.0), end=(0.0, 0.0, 0.0))
+    corner = Section(kind="corner", start=(0.0, 0.0, 0.0), end=(9.0, 0.0, 0.0))
+    run = make_run(corridor=Corridor(section=(straight, corner)))
+    section = supervisor.build(run)
+    assert section is not None
+    (trace,), marks = section.figures[0].traces, section.figures[0].layout["shapes"]
+    assert trace["y"] == ["tof0", "uwb0"]
+    assert set(trace["z"][0]) == {int(SourceState.OK)}
+    expected = np.full(400, int(SourceState.OK))
+    expected[240:264], expected[264:272] = (
+        int(SourceState.SUSPECT),
+        int(SourceState.REACQUIRE),
+    )  # 5000 samples, 400 cells
+    assert np.count_nonzero(np.array(trace["z"][1]) != expected) <= 3  # cells on a border
+    told = trace["text"][1][250]
+    assert SOURCE_STATES[SourceState.SUSPECT] in told
+    assert told.split(",")[0] in {"straight 1", "corner 2"}
+    assert len(marks) == len(section_spans(run)) - 1 > 0
+    assert "uwb0 8.0%" in section.figures[0].caption
+
+
+def test_without_a_supervisor_there_is_no_strip() -> None:
+    run = make_run()
+    blank = replace(run.track, source_states=np.zeros_like(run.track.source_states))
+    assert supervisor.build(replace(run, track=blank)) is None

@@ -94,7 +94,7 @@ def test_metrics_json_is_strict_and_equal_to_the_metrics(run: Run, folder: Path)
         raise AssertionError(text)
 
     back = json.loads((folder / "metrics.json").read_text(), parse_constant=refuse)
-    assert back == run.metrics
+    assert back == {**run.metrics, "inputs": []}  # of a flight that was never on disk
     assert json.loads(metrics_text({"a": [float("nan"), 1.0], "b": float("inf")})) == {"a": [None, 1.0], "b": None}
 
 

@@ -14,8 +14,9 @@ from axialnav.replay import cli
 from axialnav.replay.flight_writer import write_flight
 from axialnav.replay.run import replay
 from axialnav.replay.tuning.cost import Cost, Subject
-from axialnav.replay.tuning.optimise import describe, minimise, standard_errors
+from axialnav.replay.tuning.optimise import describe, standard_errors
 from axialnav.replay.tuning.parameters import apply, default_names, parameter, read
+from axialnav.replay.tuning.scoring import Expansion, minimise
 from axialnav.replay.tuning.tune import tune
 from axialnav.replay.tuning.tune_table import config_text, summary
 from tests.replay.made_recordings import flown
@@ -30,12 +31,19 @@ def quadratic(hessian: np.ndarray, at: np.ndarray):  # type: ignore[no-untyped-d
     return batch
 
 
+def bowl(hessian: np.ndarray, at: np.ndarray):  # type: ignore[no-untyped-def]
+    def expand(x: np.ndarray) -> Expansion:
+        return Expansion(quadratic(hessian, at)([x])[0], hessian @ (x - at), hessian)
+
+    return expand
+
+
 def test_the_minimum_of_a_badly_scaled_bowl_and_its_errors() -> None:
     """Twice a negative log-likelihood with covariance C has the Hessian 2 C^-1."""
     covariance = np.array([[1e-4, 2e-3, 0.0], [2e-3, 9e-2, 0.0], [0.0, 0.0, 1e-2]])
     at = np.array([0.7, -1.2, 0.1])
     batch, bounds = quadratic(2.0 * np.linalg.inv(covariance), at), [(-3.0, 3.0)] * 3
-    found, cost, _ = minimise(batch, np.zeros(3), bounds)
+    found, cost = minimise(batch, bowl(2.0 * np.linalg.inv(covariance), at), np.zeros(3), bounds)
     sigma = np.sqrt(np.diag(covariance))
     assert np.all(np.abs(found - at) < 0.2 * sigma)
     assert cost == pytest.approx(7.0, abs=0.1)
@@ -47,8 +55,9 @@ def test_the_minimum_of_a_badly_scaled_bowl_and_its_errors() -> None:
 
 
 def test_bounds_and_flat_directions_are_named() -> None:
-    batch = quadratic(np.diag([200.0, 1e-6, 200.0]), np.array([5.0, 0.0, 0.2]))
-    found, _, _ = minimise(batch, np.zeros(3), [(-1.0, 1.0)] * 3)
+    hessian, at = np.diag([200.0, 1e-6, 200.0]), np.array([5.0, 0.0, 0.2])
+    batch = quadratic(hessian, at)
+    found, _ = minimise(batch, bowl(hessian, at), np.zeros(3), [(-1.0, 1.0)] * 3)
     minimum = describe(batch, found, [(-1.0, 1.0)] * 3)
     assert minimum.at_bound.tolist() == [True, False, False]
     assert minimum.unidentifiable.tolist() == [False, True, False]

@@ -45,7 +45,8 @@ def _camera(run: Run) -> tuple[str, Camera] | None:
     """First camera that looks at a surface and took a window of frames."""
     for name, spec in run.config.sensor.items():
         usable = isinstance(spec, Camera) and spec.surface is not None and name not in run.config.disabled
-        if usable and len(run.flight.tables.get(name, ())) >= run.config.camera.frames:
+        table = run.flight.tables.get(name)
+        if usable and table is not None and not table.is_motion and len(table) >= run.config.camera.frames:
             assert isinstance(spec, Camera)
             return name, spec
     return None

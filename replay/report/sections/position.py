@@ -17,13 +17,14 @@ Array = NDArray[np.float64]
 
 def build(run: Run) -> Section:
     """Estimate in the truth's frame where the two had to be aligned."""
-    motion = _alignment(run)
+    motion = alignment_of(run)
     note = "Estimate after rigid alignment with the truth: the frames are unrelated." if motion is not IDENTITY else ""
     figures = [_axes(run, motion, "position", "m"), _axes(run, motion, "velocity", "m/s"), _path(run, motion)]
     return Section("Position and velocity", figures, note=note)
 
 
-def _alignment(run: Run) -> RigidMotion:
+def alignment_of(run: Run) -> RigidMotion:
+    """What takes the estimate into the frame of the truth, where the two are unrelated."""
     if run.flight.truth is None or run.metrics["alignment"] != "rigid":
         return IDENTITY
     return match(run.track, run.flight.truth, run.flight.evaluation, align=True).alignment

@@ -8,6 +8,7 @@ from importlib import metadata
 
 import numpy as np
 
+from axialnav.replay.inputs import combined
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
 
@@ -29,12 +30,19 @@ def build(run: Run) -> Section:
         ),
         ("digest of fused.csv", run.metrics["digest"], "over every number of fused.csv: equal inputs, equal digest"),
         ("SHA-256 of the readings", _readings_digest(run), "over stamps and values of all sensors as they were read"),
+        *_inputs(run),
         ("SHA-256 of config.toml", hashlib.sha256(run.config.to_toml().encode()).hexdigest(), "all settings, resolved"),
         ("software", ", ".join(f"{name} {_version(name)}" for name in LIBRARIES), ""),
         ("machine", f"Python {platform.python_version()}, {platform.system()} {platform.machine()}", ""),
         ("replay", replayed, "recorded time, and time that the replay took, reading excluded"),
     ]
-    return Section("Provenance", template="provenance.html.j2", values={"facts": facts, "drops": run.flight.drops})
+    values = {"facts": facts, "inputs": run.flight.inputs, "drops": run.flight.drops}
+    return Section("Provenance", template="provenance.html.j2", values=values)
+
+
+def _inputs(run: Run) -> list[tuple[str, str, str]]:
+    files = run.flight.inputs
+    return [("SHA-256 of the input files", combined(files), "over the paths and hashes below")] if files else []
 
 
 def _version(name: str) -> str:

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from axialnav.fusion.outcome import Health, Verdict
 from axialnav.replay.report.corridor import section_marks
 from axialnav.replay.report.figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, Figure
+from axialnav.replay.report.rows import CELLS, Row, cell_edges, cell_map, cells_of, strip_height_px
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
 
-Row = tuple[str, list[int | None], list[str]]
-BINS = 400
 COLOURS = {
     Verdict.FUSED: GREEN,
     Verdict.GATED: ORANGE,
@@ -31,7 +30,7 @@ MAX_TIMEOUTS = 100
 
 def build(run: Run) -> Section:
     """Each cell has the colour of what happened to most readings in it; the pointer shows all counts."""
-    edges = np.linspace(0.0, max((run.track.t_ns[-1] - run.track.t_ns[0]) * 1e-9, 1e-3), BINS + 1)
+    edges = cell_edges(run)
     rows = [*_sensor_rows(run, edges), *_condition_rows(run, edges)]
     note = (
         "Colour: what happened to most readings of that moment. White space: no reading. Underlined: not fused for "
@@ -43,7 +42,8 @@ def build(run: Run) -> Section:
         "shapes": [*marks.get("shapes", ()), *_reset_lines(run), *_timeout_lines(run, [name for name, _, _ in rows])],
         "yaxis": {"autorange": "reversed", "fixedrange": True},
     }
-    figure = Figure(_heatmap(rows, edges), "", _resets_caption(run), height_px=110 + 34 * len(rows), layout=layout)
+    cells = cell_map(rows, edges, [*COLOURS.values(), GREY])
+    figure = Figure(cells, "", _resets_caption(run), height_px=strip_height_px(rows), layout=layout)
     legend = [(verdict.name.lower(), colour) for verdict, colour in COLOURS.items()]
     return Section("Sensors over time", [figure], "strip.html.j2", note, {"legend": [*legend, *OTHER_COLOURS]})
 
@@ -51,14 +51,14 @@ def build(run: Run) -> Section:
 def _sensor_rows(run: Run, edges: NDArray[np.float64]) -> list[Row]:
     log = run.log
     seconds = (log.t_ns - run.track.t_ns[0]) * 1e-9
-    cell = np.clip(np.searchsorted(edges, seconds, side="right") - 1, 0, BINS - 1)
+    cell = cells_of(seconds, edges)
     rows = []
     for index, name in enumerate(log.sensors):
         mine = log.source == index
         if not mine.any():
             continue
-        counts = np.bincount(cell[mine] * len(Verdict) + log.verdict[mine], minlength=BINS * len(Verdict))
-        counts = counts.reshape(BINS, len(Verdict))
+        counts = np.bincount(cell[mine] * len(Verdict) + log.verdict[mine], minlength=CELLS * len(Verdict))
+        counts = counts.reshape(CELLS, len(Verdict))
         codes = [int(c) if total else None for c, total in zip(counts.argmax(1), counts.sum(1), strict=True)]
         rows.append((name, codes, [_words(row) for row in counts.tolist()]))
     return rows
@@ -78,27 +78,6 @@ def _condition_rows(run: Run, edges: NDArray[np.float64]) -> list[Row]:
             present = np.histogram(seconds[hit], edges)[0] > 0
             rows.append((name, [CONDITION if p else None for p in present], [name if p else "" for p in present]))
     return rows
-
-
-def _heatmap(rows: list[Row], edges: NDArray[np.float64]) -> list[dict[str, Any]]:
-    colours = [*COLOURS.values(), GREY]
-    steps = [(i + k) / len(colours) for i in range(len(colours)) for k in (0, 1)]
-    scale = [[step, colours[i // 2]] for i, step in enumerate(steps)]
-    return [
-        {
-            "type": "heatmap",
-            "x": [round(float(x), 4) for x in 0.5 * (edges[1:] + edges[:-1])],
-            "y": [name for name, _, _ in rows],
-            "z": [codes for _, codes, _ in rows],
-            "text": [words for _, _, words in rows],
-            "hovertemplate": "%{y} at %{x:.1f} s: %{text}<extra></extra>",
-            "zmin": -0.5,
-            "zmax": len(colours) - 0.5,
-            "colorscale": scale,
-            "showscale": False,
-            "ygap": 6,
-        }
-    ]
 
 
 def _reset_seconds(run: Run) -> list[float]:
