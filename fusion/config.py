@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from axialnav.fusion.errors import ConfigError
-from axialnav.fusion.strict_toml import decode, dump, parse, set_by_path
+from axialnav.fusion.strict_toml import decode, dump, parse, read_text, set_by_path
 from axialnav.models.rig import AnySensor, NonNegative, Positive, Surface, Vector3
 
 Probability = Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
@@ -308,10 +308,7 @@ class Config(_Table, frozen=True, kw_only=True):
     @classmethod
     def from_toml(cls, path: str | Path) -> Config:
         """Read a TOML file; raises :class:`ConfigError` with one line for a person."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f"configuration {path}: cannot be read: {error}") from None
+        text = read_text(Path(path), "configuration")
         return cls.from_dict(parse(text, where=str(path)), where=str(path))
 
     def to_dict(self) -> dict[str, Any]:

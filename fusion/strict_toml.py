@@ -11,6 +11,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
@@ -18,6 +19,7 @@ import msgspec
 from axialnav.fusion.errors import ConfigError
 
 T = TypeVar("T")
+MAX_BYTES = 16 << 20
 _UNKNOWN = re.compile(r"unknown field `(?P<field>[^`]+)`(?: - at `(?P<path>[^`]+)`)?")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -49,6 +51,27 @@ def _not_numbers(node: Any, path: str) -> Iterator[str]:
             yield from _not_numbers(value, f"{path}.{index}")
     elif isinstance(node, float) and math.isnan(node):
         yield path
+
+
+def read_text(path: Path, what: str) -> str:
+    """Text of a settings file.
+
+    Raises
+    ------
+    ConfigError
+        No file, not readable, no text, or larger than any settings are; ``what`` says what it was meant to be.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ConfigError(
+                f"{what} {path}: {size} bytes, but no settings file is larger than {MAX_BYTES}; name another"
+            )
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{what} {path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise ConfigError(f"{what} {path}: cannot be read: it is not a text file, and settings are TOML") from None
 
 
 def parse(text: str, *, where: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from axialnav.fusion.errors import ConfigError
-from axialnav.fusion.strict_toml import decode, parse
+from axialnav.fusion.strict_toml import decode, parse, read_text
 
 DEFAULT_LIMITS = Path(__file__).parent / "limits" / "default.toml"
 Path_ = Annotated[str, msgspec.Meta(pattern=r"^[^.]+(\.[^.]+)*$")]
@@ -78,13 +78,7 @@ def read_limits(path: Path | None = None) -> dict[str, Limit]:
         The file cannot be read, is no TOML, has an unknown key or a value of the wrong type, or holds no check.
     """
     source = path or DEFAULT_LIMITS
-    try:
-        text = source.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"limits {source}: cannot be read ({error.strerror}); see docs/check.md") from None
-    except UnicodeDecodeError:
-        raise ConfigError(f"limits {source}: not a text file; limits are TOML, see docs/check.md") from None
-    checks = decode(parse(text, where=str(source)), LimitsFile, where=str(source)).check
+    checks = decode(parse(read_text(source, "limits"), where=str(source)), LimitsFile, where=str(source)).check
     if not checks:
         raise ConfigError(f"limits {source}: no [check.NAME] table in it, so there is nothing to check")
     return checks

@@ -82,7 +82,8 @@ def replay(
     flight
         A loaded flight, or the path of one.
     config
-        Settings; what it leaves open (sensors, surfaces, corridor, first state) comes from the flight.
+        Settings; what it leaves open (sensors, surfaces, corridor, first state) comes from the flight.  None: the
+        settings that a recording made on board was flown with, the defaults for any other flight.
     without
         Names of sensors to switch off.
     estimator
@@ -119,8 +120,12 @@ def replay(
 def resolve(
     config: Config | None, flight: Flight, *, without: Sequence[str] = (), params: Mapping[str, str] | None = None
 ) -> Config:
-    """Settings as the filter will see them: defaults, then the flight, then ``config``, ``params`` and ``without``."""
-    resolved = (config or Config()).with_defaults_from(flight.config)
+    """Settings as the filter will see them: those of ``config`` where there is one, else those that the flight was
+    flown with (recordings made on board tell, others have the defaults); then ``params`` and ``without``.
+
+    Rig and world, which ``config`` need not hold, come from the flight.
+    """
+    resolved = (config or flight.config).with_defaults_from(flight.config)
     if params:
         resolved = resolved.with_params(dict(params))
     return resolved.without(tuple(without)) if without else resolved

@@ -15,7 +15,7 @@ import msgspec
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError
 from axialnav.fusion.live.nooploop.readings import TofModel
-from axialnav.fusion.strict_toml import decode, parse
+from axialnav.fusion.strict_toml import decode, parse, read_text
 from axialnav.models.rig import AttitudeSource, Camera, Flow, Imu, Positive, RangeFinder, Uwb
 
 Byte = Annotated[int, msgspec.Meta(ge=0, le=255)]
@@ -144,11 +144,7 @@ class Vehicle(_Table, frozen=True, kw_only=True):
             Unreadable, unknown key, wrong value, or a sensor that ``[filter]`` does not describe.
         """
         path = Path(path)
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f"vehicle file {path}: cannot be read: {error}") from None
-        vehicle = decode(parse(text, where=str(path)), cls, where=str(path))
+        vehicle = decode(parse(read_text(path, "vehicle file"), where=str(path)), cls, where=str(path))
         if vehicle.filter_file is None:
             return vehicle
         if vehicle.filter != Config():

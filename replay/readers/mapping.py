@@ -10,7 +10,7 @@ from typing import Literal
 import msgspec
 
 from axialnav.fusion.errors import ConfigError, FlightError
-from axialnav.fusion.strict_toml import decode, parse
+from axialnav.fusion.strict_toml import decode, parse, read_text
 from axialnav.models.rig import AnySensor
 from axialnav.replay.readers.flight_toml import FlightToml
 
@@ -75,9 +75,9 @@ def load_mapping(path: Path, own: Path | None, default: str) -> tuple[Mapping, f
     if own is None:
         return base, frozenset()
     try:
-        asked = _decode(own.read_text(encoding="utf-8"), str(own))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FlightError(f"{own}: mapping cannot be read: {error}") from None
+        asked = _decode(read_text(own, "mapping"), str(own))
+    except ConfigError as error:
+        raise FlightError(str(error)) from None
     _check_names(asked, base, own)
     if not asked.defaults:
         return asked, frozenset(asked.source)

@@ -20,12 +20,14 @@ def minmax_rows(values: Array, max_points: int = MAX_POINTS) -> NDArray[np.int64
         return np.arange(count)
     bins = max_points // 2 - 1
     edges = np.linspace(0, count, bins + 1).astype(np.int64)
-    rows = np.arange(count)
-    starts = edges[:-1]
-    of_bin = np.repeat(np.arange(bins), np.diff(edges))
-    ascending = np.lexsort((rows, np.where(np.isnan(values), np.inf, values), of_bin))
-    descending = np.lexsort((rows, np.where(np.isnan(values), np.inf, -values), of_bin))
-    return np.unique(np.concatenate(([0, count - 1], ascending[starts], descending[starts])))
+    starts, ends = edges[:-1, None], edges[1:, None]
+    rows = starts + np.arange(int(np.diff(edges).max()))
+    outside = rows >= ends
+    binned = values[np.minimum(rows, count - 1)]
+    outside |= np.isnan(binned)
+    lowest = np.argmin(np.where(outside, np.inf, binned), axis=1)
+    highest = np.argmax(np.where(outside, -np.inf, binned), axis=1)
+    return np.unique(np.concatenate(([0, count - 1], edges[:-1] + lowest, edges[:-1] + highest)))
 
 
 def scatter_rows(values: Array, max_points: int = MAX_POINTS) -> NDArray[np.int64]:

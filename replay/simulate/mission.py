@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from axialnav.fusion.errors import ConfigError
-from axialnav.fusion.strict_toml import decode, parse
+from axialnav.fusion.strict_toml import decode, parse, read_text
 from axialnav.models.rig import NonNegative, Positive, Vector3
 
 Side = Literal["left", "right"]
@@ -137,9 +136,5 @@ def read_mission(path: Path) -> Mission:
     ConfigError
         Not readable, not TOML, an unknown key (with the nearest known one) or a value out of its limits.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"mission {path}: cannot be read: {error}") from None
-    table = parse(text, where=str(path))
+    table = parse(read_text(path, "mission"), where=str(path))
     return decode({"name": path.stem, **table}, Mission, where=str(path))

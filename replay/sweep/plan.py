@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from axialnav.fusion.errors import ConfigError
+from axialnav.fusion.strict_toml import parse, read_text
 
 MAX_JOBS = 100_000
 
@@ -54,22 +55,15 @@ def plan(
             f"{len(logs)} flights times {len(combinations)} settings are {len(logs) * len(combinations)} replays, "
             f"the limit is {MAX_JOBS}; sweep fewer values at once"
         )
-    mapped = [] if mapping is None else [_text(mapping)]
+    mapped = [] if mapping is None else [parse(read_text(mapping, "mapping"), where=str(mapping))]
     place = None if mapping is None else str(mapping.resolve())
     jobs = []
     for log in dict.fromkeys(str(path.resolve()) for path in logs):
         for params in combinations:
             what = [log, list(params), config_text, list(without), estimator, *mapped]
-            key = hashlib.sha256(json.dumps(what).encode()).hexdigest()[:16]
+            key = hashlib.sha256(json.dumps(what, default=str).encode()).hexdigest()[:16]
             jobs.append(Job(key, log, tuple(params), config_text, tuple(without), estimator, place))
     return jobs
-
-
-def _text(mapping: Path) -> str:
-    try:
-        return mapping.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"--mapping {mapping}: cannot be read: {error}") from None
 
 
 def parse_grid(texts: Sequence[str]) -> dict[str, list[str]]:

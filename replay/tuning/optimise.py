@@ -85,7 +85,7 @@ def describe(batch: Batch, at: Array, bounds: Sequence[tuple[float, float]]) -> 
     at_bound = (at - lows < NEAR_BOUND) | (highs - at < NEAR_BOUND)
     sigma, correlation = standard_errors(hessian)
     blunt = ~(sigma < BLUNT_SIGMA)
-    return Minimum(at, cost, sigma, correlation, at_bound, blunt & ~at_bound)
+    return Minimum(at, cost, sigma, correlation, at_bound, blunt)
 
 
 def standard_errors(hessian: Array) -> tuple[Array, Array]:

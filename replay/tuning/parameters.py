@@ -128,14 +128,14 @@ def parameter(config: Config, name: str, start: float | None = None) -> Paramete
 def default_names(config: Config, tables: Mapping[str, Table]) -> list[str]:
     """Settings that are freed if nobody says which: the noise of what was read, accelerometer and its bias walk.
 
-    Not that of barometers: their errors drift, every reading says what the one before said, and the likelihood, which
-    takes them as independent, would believe them far too much.
+    Not that of barometers and of the autopilot's attitude: their errors drift, every reading says what the one before
+    said, and the likelihood, which takes them as independent, would believe them far too much.
     """
     names = ["imu.accel_noise_scale", "imu.accel_walk_scale"]
     for sensor, spec in config.sensor.items():
         kind = kind_of(spec)
         there = sensor in tables and len(tables[sensor].t_ns) and sensor not in config.disabled
-        if there and kind not in (None, Kind.IMU, Kind.HEIGHT):
+        if there and kind not in (None, Kind.IMU, Kind.HEIGHT, Kind.ATTITUDE):
             names.append(_noise_name(sensor, spec, config))
     return list(dict.fromkeys(names))
 
@@ -148,10 +148,7 @@ def _noise_name(sensor: str, spec: AnySensor, config: Config) -> str:
         return f"sensor.{sensor}.sigma_m" if (own or 0.0) > read(config, general) else general
     if own is not None:
         return f"sensor.{sensor}.{'sigma_px' if isinstance(spec, Flow) else 'sigma_m'}"
-    kind = kind_of(spec)
-    if kind is Kind.ATTITUDE:
-        return f"sensor.{sensor}.sigma_rad" if getattr(spec, "sigma_rad", None) else "attitude.sigma_rad"
-    return "range.sigma_m" if kind is Kind.RANGE else "flow.sigma_rad"
+    return "range.sigma_m" if kind_of(spec) is Kind.RANGE else "flow.sigma_rad"
 
 
 def freed(config: Config, tables: Mapping[str, Table], names: Sequence[str]) -> list[Parameter]:

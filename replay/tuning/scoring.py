@@ -48,7 +48,11 @@ class Search(NamedTuple):
 
 
 def minimise(
-    batch: Batch, expand: Callable[[Array], Expansion], start: Array, bounds: Sequence[tuple[float, float]]
+    batch: Batch,
+    expand: Callable[[Array], Expansion],
+    start: Array,
+    bounds: Sequence[tuple[float, float]],
+    tolerance: float = TOLERANCE,
 ) -> Search:
     """Best point found within the bounds.
 
@@ -66,13 +70,15 @@ def minimise(
         (n,).
     bounds
         Lowest and highest value of each coordinate.
+    tolerance
+        Stop where a step gains less than this.
     """
     box = np.array(bounds, dtype=np.float64).T
     found = Search(np.array(start, dtype=np.float64), batch([start])[0])
     for _ in range(MAX_ROUNDS):
         looked = found = _look_around(batch, found, box)
-        found = _descend(batch, expand, found.at, box)
-        if float(np.abs(found.at - looked.at).max()) < LOOK[2]:
+        found = _descend(batch, expand, found.at, box, tolerance)
+        if float(np.abs(found.at - looked.at).max()) < LOOK[2] or tolerance > ROUND_TOLERANCE:
             break
     return found
 
@@ -89,7 +95,7 @@ def _look_around(batch: Batch, found: Search, box: Array) -> Search:
     return found
 
 
-def _descend(batch: Batch, expand: Callable[[Array], Expansion], start: Array, box: Array) -> Search:
+def _descend(batch: Batch, expand: Callable[[Array], Expansion], start: Array, box: Array, tolerance: float) -> Search:
     at, here, damping = start, expand(start), FIRST_DAMPING
     for _ in range(MAX_STEPS):
         points = [_clip(at + _step(at, here, d, box), box) for d in (damping, SPREAD * damping)]
@@ -100,7 +106,7 @@ def _descend(batch: Batch, expand: Callable[[Array], Expansion], start: Array, b
             at, damping = points[best], damping * (BOLDER if best == 0 else 1.0)
         else:
             damping *= CALMER * SPREAD
-        if abs(gain) < TOLERANCE or damping > HOPELESS_DAMPING:
+        if abs(gain) < tolerance or damping > HOPELESS_DAMPING:
             return Search(at, min(here.cost, costs[best]))
         if gain > 0.0:
             here = expand(at)

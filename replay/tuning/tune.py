@@ -19,10 +19,10 @@ from axialnav.replay.run import replay, resolve
 from axialnav.replay.tuning.cost import Cost, Subject
 from axialnav.replay.tuning.optimise import Minimum, describe
 from axialnav.replay.tuning.parameters import Parameter, apply, freed
-from axialnav.replay.tuning.scoring import minimise
+from axialnav.replay.tuning.scoring import TOLERANCE, minimise
 
 Array = NDArray[np.float64]
-COARSE_S = 30.0
+COARSE_S, COARSE_TOLERANCE = 30.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _search(
         cost.refer_to(start)
         if not cost.readings:
             raise FlightError("no reading was compared with a prediction, so there is nothing to tune by")
-        start = minimise(cost, cost.expand, start, bounds).at
+        start = minimise(cost, cost.expand, start, bounds, TOLERANCE if share == 1.0 else COARSE_TOLERANCE).at
         count += cost.replays
         if progress is not None:
             progress(0.3 + 0.5 * index)
@@ -194,10 +194,14 @@ def tuned_config(config: Config | None, flight: Flight, values: dict[str, float]
     default = Config().to_dict()
     out = {key: value for key, value in given.items() if value != default[key]}
     for key, table in changed.items():
-        if isinstance(table, dict) and key not in {"sensor", "surface", "corridor", "initial"}:
+        if key in {"sensor", "surface", "corridor", "initial"}:
+            continue
+        if isinstance(table, dict):
             different = {name: value for name, value in table.items() if value != default[key].get(name)}
             if different:
                 out[key] = different
+        elif table != default[key]:
+            out[key] = table
     sensors = {**given["sensor"], **{name: changed["sensor"][name] for name in sorted(named)}}
     if sensors:
         out["sensor"] = sensors

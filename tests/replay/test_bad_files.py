@@ -12,6 +12,7 @@ import pytest
 from axialnav.replay import cli
 from axialnav.replay.convert.convert import convert
 from tests.replay.made_recordings import flown
+from tests.replay.made_runs import make_run
 
 LOG_VERBS: dict[str, list[str]] = {
     "doctor": ["doctor", "BAD"],
@@ -32,7 +33,7 @@ SETTING_VERBS: dict[str, list[str]] = {
     "calibrate --config": ["calibrate", "GOOD", "--config", "BAD", "--out", "OUT"],
     "sweep --config": ["sweep", "GOOD", "--config", "BAD", "--out", "OUT"],
     "sweep --mapping": ["sweep", "GOOD", "--mapping", "BAD", "--out", "OUT"],
-    "check --limits": ["check", "GOOD", "--limits", "BAD"],
+    "check --limits": ["check", "RUN", "--limits", "BAD"],
     "live": ["live", "--config", "BAD"],
     "camera": ["camera", "--config", "BAD"],
 }
@@ -72,17 +73,18 @@ BAD: dict[str, Callable[[Path, Path], None]] = {
 
 @pytest.fixture(scope="module")
 def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A good flight and the same in other formats."""
+    """A good flight, the same in other formats, and a run."""
     folder, flight = tmp_path_factory.mktemp("material"), flown(1, 3.0)
     for name in ("flight", "log.mcap", "log.tlog", "log.bin", "log.bag"):
         convert(flight, folder / name)
+    make_run().write(folder / "run")
     return folder
 
 
 def refused(words: list[str], bad: str, place: Path, material: Path, capsys: pytest.CaptureFixture[str]) -> int:
     path, out = place / "bad.log", place / "out"
     BAD[bad](path, material)
-    named = {"BAD": str(path), "OUT": str(out), "GOOD": str(material / "flight")}
+    named = {"BAD": str(path), "OUT": str(out), "GOOD": str(material / "flight"), "RUN": str(material / "run")}
     code = cli.main([named.get(word, word) for word in words])
     told = capsys.readouterr()
     assert told.err.count("\n") == 1, told.err

@@ -130,6 +130,7 @@ def test_what_a_camera_measured_on_board_is_replayed_as_it_was(tmp_path: Path) -
     readings = [
         msgspec.structs.replace(r, sensor="cam0", sigma_px=0.8) if isinstance(r, PixelMotion) else r
         for r in flight.readings()
+        if known_ns(r) < int(flight.tables["imu0"].t_ns[-1]) or isinstance(r, ImuSample)
     ]
     path, state, verdicts = fly(config, [(known_ns(r), r) for r in readings], tmp_path)
     assert verdicts[Verdict.FUSED] > 300

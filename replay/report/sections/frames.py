@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import frame_stack
-from axialnav.estimators.spectral.picture import composite_rows, spectra_of
 from axialnav.models.rig import Camera
 from axialnav.replay.report.figure import BLUE, GREY, Figure, Trace, numbers
-from axialnav.replay.report.moments import Moment, Picture, moments
 from axialnav.replay.report.png import data_address
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
+
+if TYPE_CHECKING:
+    from axialnav.replay.report.moments import Moment, Picture
 
 MAX_WIDTH = 480
 MAX_NOTCHES = 12
@@ -27,10 +27,15 @@ NOTE = (
 
 
 def build(run: Run) -> Section | None:
-    """Nothing for flights without frames of a wall; a sentence where the pictures cannot be read."""
+    """Nothing for flights without frames of a wall; a sentence where the pictures cannot be read.
+
+    What works on pictures is loaded where there are some: OpenCV takes longer to load than a report to write.
+    """
     camera = _camera(run)
     if camera is None:
         return None
+    from axialnav.replay.report.moments import moments
+
     name, spec = camera
     try:
         found = moments(run, name, spec)
@@ -74,6 +79,9 @@ def _small(picture: Picture) -> Picture:
 
 def _spectrum(moment: Moment) -> Figure:
     """Mean power of the rows of the composite in decibels of its largest value."""
+    from axialnav.estimators.frames import frame_stack
+    from axialnav.estimators.spectral.picture import composite_rows, spectra_of
+
     spectra = spectra_of(composite_rows(frame_stack(moment.frames, "x", 2)), 1.0)
     power = 10.0 * np.log10(np.maximum(spectra.mean, 1e-12))
     power -= power.max()
