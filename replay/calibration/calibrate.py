@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
@@ -146,6 +146,8 @@ def _image(flight: Flight, config: Config, table: SensorTable, name: str, spec: 
     line = fit_line(x, y)
     if line is None or line.slope <= 0.0:
         return f"{name}: fewer than 20 readings with a known path and a spread of speeds"
+    known = path.sigma_m_s / float(np.sqrt(np.nanmean(np.sum(path.velocity_m_s**2, axis=1))))
+    line = replace(line, sigma_slope=float(np.hypot(line.sigma_slope, line.slope * known)))
     focal = float(spec.focal_px[0])
     slope = float(np.nanmedian(distance) / (focal * line.slope * np.nanmedian(window)))
     return ImageScale(name, path.source, line, focal * line.slope, focal * line.sigma_slope, fit_line(y, v), slope)
@@ -172,7 +174,8 @@ def _range(flight: Flight, config: Config, table: SensorTable, name: str, spec: 
     offset = fit_line(expected - np.nanmean(expected), measured - expected)
     if line is None or offset is None:
         return f"{name}: fewer than 20 readings with a known path"
-    return RangeOffset(name, path.source, offset.intercept, offset.sigma_intercept, line)
+    sigma_m = float(np.hypot(offset.sigma_intercept, path.sigma_m))
+    return RangeOffset(name, path.source, offset.intercept, sigma_m, line)
 
 
 def calibrated_config(config: Config | None, flight: Flight, found: Calibration) -> dict[str, Any]:

@@ -25,7 +25,8 @@ class Path:
     """Position, velocity and attitude at the instants of a sensor; NaN where they are not known.
 
     ``position_m``, ``velocity_m_s`` (world), ``rate_rad_s`` (body) are (n, 3), ``rotation_WB`` (n, 3, 3); ``source``
-    says where they come from.
+    says where they come from.  ``sigma_m`` and ``sigma_m_s`` are how well position and velocity are known, worst axis,
+    median over the flight: errors that all readings share, which no number of readings makes smaller.
     """
 
     position_m: Array
@@ -33,6 +34,8 @@ class Path:
     rate_rad_s: Array
     rotation_WB: Array
     source: str
+    sigma_m: float = 0.0
+    sigma_m_s: float = 0.0
 
 
 def path_at(flight: Flight, config: Config, t_ns: Stamps, sensor: str) -> Path:
@@ -47,6 +50,7 @@ def path_at(flight: Flight, config: Config, t_ns: Stamps, sensor: str) -> Path:
     if truth is not None and np.isfinite(truth.velocity_m_s).any() and config.initial is not None:
         stamps, source = truth.t_ns, "ground truth"
         columns = (truth.position_m, truth.velocity_m_s, truth.quaternion_WB)
+        sigmas = (0.0, 0.0)
     else:
         run = replay(flight, config, without=(sensor,), smooth=True)
         if not any(s["fused"] for s in run.metrics["sensors"].values()):
@@ -54,8 +58,15 @@ def path_at(flight: Flight, config: Config, t_ns: Stamps, sensor: str) -> Path:
         track = run.track
         stamps, source = track.t_ns, f"smoothed replay without {sensor}"
         columns = (track.position_m, track.velocity_m_s, track.quaternion_WB)
+        sigmas = (_worst(track.position_covariance), _worst(track.velocity_covariance))
     moved = interpolate(t_ns, stamps, np.hstack(columns), MAX_GAP_NS)
-    return Path(moved[:, :3], moved[:, 3:6], _rate(flight, config, t_ns), rotations(moved[:, 6:10]), source)
+    return Path(moved[:, :3], moved[:, 3:6], _rate(flight, config, t_ns), rotations(moved[:, 6:10]), source, *sigmas)
+
+
+def _worst(covariance: Array) -> float:
+    """Median over time of the standard deviation of the worst axis; covariances (n, 3, 3)."""
+    variances = np.einsum("nii->ni", covariance)
+    return float(np.sqrt(np.median(variances.max(axis=1))))
 
 
 def _rate(flight: Flight, config: Config, t_ns: Stamps) -> Array:

@@ -13,7 +13,7 @@ from pyarrow import parquet
 
 from axialnav.fusion.live.recorder.recorder import Recorder
 from axialnav.replay import cli
-from axialnav.replay.flight import Flight
+from axialnav.replay.flight import load_flight
 from axialnav.replay.flight_writer import write_flight
 from tests.replay.made_recordings import flown
 
@@ -21,13 +21,8 @@ FORMATS = ("copy", "log.mcap", "log.tlog", "log.bin", "log.bag", "log.ros2")
 
 
 @pytest.fixture(scope="module")
-def flight() -> Flight:
-    return flown(9, 6.0)
-
-
-@pytest.fixture(scope="module")
-def folder(flight: Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_flight(flight, tmp_path_factory.mktemp("flown") / "flight")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_flight(flown(9, 6.0), tmp_path_factory.mktemp("flown") / "flight")
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +68,9 @@ def test_a_converted_log(folder: Path, digest: str, tmp_path: Path, form: str) -
     assert replayed(tmp_path / form, tmp_path / "run") == digest
 
 
-def test_a_recording_of_shuffled_arrivals(flight: Flight, digest: str, tmp_path: Path) -> None:
+def test_a_recording_of_shuffled_arrivals(folder: Path, digest: str, tmp_path: Path) -> None:
     """Every reading up to 0.3 s after its stamp, each sensor in an order of its own."""
+    flight = load_flight(folder)
     readings = list(flight.readings())
     rng = np.random.default_rng(5)
     arrival = [r.t_ns + int(rng.integers(0, 300_000_000)) for r in readings]
