@@ -22,7 +22,7 @@ from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, build_settings, new_memory, new_scratch
 from axialnav.fusion.outcome import InnovationLog, Verdict
 from axialnav.fusion.sources import Kind, Records, build_sources
-from axialnav.models.jit import threaded_kernel
+from axialnav.models.scalar_kernel import threaded_kernel
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_ATT, E_POS
 
 Array = NDArray[np.float64]

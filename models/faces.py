@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import Integer, kernel
+from axialnav.models.jit import Integer
 from axialnav.models.ray import distance_along_ray
+from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 FACE_WIDTH = 11  # normal (3), offset, start (3), end (3), roughness

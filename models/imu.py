@@ -18,8 +18,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
 from axialnav.models.rotations import matrix_from_quaternion, rotate_in_body
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import ACCEL_BIAS, GYRO_BIAS, POS, QUAT, VEL
 
 Array = NDArray[np.float64]

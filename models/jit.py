@@ -67,11 +67,16 @@ def threaded_kernel(function: F) -> F:
 
 def _compiled(function: F, *, nogil: bool) -> F:
     compiled: Any = numba.njit(cache=True, error_model="numpy", nogil=nogil)(function)
-    cache = getattr(compiled, "_cache", None)  # there is none with NUMBA_DISABLE_JIT=1
-    if cache is not None:
-        cache._cache_file = _PackageCacheFile(cache._cache_path, cache._impl.filename_base)
+    cache_with_stamp(compiled)
     result: F = compiled
     return result
+
+
+def cache_with_stamp(compiled: Any, suffix: str = "") -> None:
+    """Let the cache of a compiled function see changes in the whole package; ``suffix`` keeps two of them apart."""
+    cache = getattr(compiled, "_cache", None)  # there is none with NUMBA_DISABLE_JIT=1
+    if cache is not None:
+        cache._cache_file = _PackageCacheFile(cache._cache_path, cache._impl.filename_base + suffix)
 
 
 def native(entry: Callable[[Any], int]) -> Callable[[int], int]:

@@ -25,8 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.models.faces import GRAZING
-from axialnav.models.jit import Integer, kernel
+from axialnav.models.jit import Integer
 from axialnav.models.ray import distance_along_ray
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import (
     BLUR_SCALE,
     E_ATT,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
+from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 

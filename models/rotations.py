@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
+from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 SMALL_ANGLE_SQUARED = 1e-8  # below, the series is exact to float64

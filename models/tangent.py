@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
+from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 SMALL_ANGLE = 1e-4  # below, the series is exact to float64

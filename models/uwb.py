@@ -14,7 +14,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import Integer, kernel
+from axialnav.models.jit import Integer
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, UWB_BIAS
 
 Array = NDArray[np.float64]

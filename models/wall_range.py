@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
 from axialnav.models.ray import distance_along_ray
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_ATT, E_POS, E_WALL_OFFSET
 
 Array = NDArray[np.float64]

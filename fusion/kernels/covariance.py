@@ -14,8 +14,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import kernel
 from axialnav.models.rotations import rotate_in_body
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_UWB_BIAS, N_ERROR, QUAT
 
 Array = NDArray[np.float64]

@@ -13,8 +13,9 @@ from axialnav.fusion.kernels.shadow import aid_shadow
 from axialnav.fusion.kernels.tracker import STUCK, SUPERVISOR, follow
 from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import LOG_CODE, LOG_WEIGHT
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Record
 from axialnav.models.rotations import matrix_from_quaternion
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import QUAT
 
 Array = NDArray[np.float64]

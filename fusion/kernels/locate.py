@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_TDOA
 from axialnav.fusion.kernels.reanchor import solve_symmetric
 from axialnav.fusion.kernels.tracker import path_length, refer
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Record
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_POS, POS
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ from axialnav.fusion.kernels.window import state_in_window
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Record
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_VEL, N_ERROR
 from axialnav.models.uwb import uwb_position, uwb_range, uwb_tdoa
 from axialnav.models.wall_range import wall_range

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import Integer, Record, kernel
+from axialnav.models.jit import Integer, Record
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_UWB_BIAS, N_BIASES, N_ERROR, UWB_BIAS
 
 Array = NDArray[np.float64]

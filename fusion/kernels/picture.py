@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.memory import COLUMNS
 from axialnav.models.faces import nearest_face
-from axialnav.models.jit import Integer, Record, kernel
+from axialnav.models.jit import Integer, Record
 from axialnav.models.pixel_motion import pixel_motion
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import N_ERROR, WALL_OFFSET
 
 Array = NDArray[np.float64]

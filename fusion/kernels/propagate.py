@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from axialnav.fusion.kernels.covariance import predict_covariance
 from axialnav.fusion.kernels.window import note_motion
 from axialnav.models.imu import strapdown
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Record
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import (
     E_ACCEL_BIAS,
     E_ATT,

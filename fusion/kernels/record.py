@@ -16,8 +16,9 @@ from axialnav.fusion.kernels.rival import copy_filter
 from axialnav.fusion.kernels.run import run
 from axialnav.fusion.kernels.smooth import IDENTITY, INERTIAL, NEW_PATHS, REANCHORING
 from axialnav.models.imu import strapdown
-from axialnav.models.jit import Record, Records, kernel
-from axialnav.models.state import N_BIASES
+from axialnav.models.jit import Record, Records
+from axialnav.models.scalar_kernel import kernel
+from axialnav.models.state import N_BIASES, N_NOMINAL
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -121,6 +122,7 @@ def _transition(s: Record, row: int, imu: Array, m: Record, w: Record, c: Record
     """Blocks of the transition of filter ``row`` over the step that ``s`` describes."""
     for k in range(6):
         w.mean_imu[k] = 0.5 * (imu[k] + m.imu[k])
-    x = s.x_before[row].copy()
-    s.decay[row] = bias_decay(x, s.dt, c)
-    strapdown(x, w.mean_imu[0:3], w.mean_imu[3:6], s.dt, c.gravity_m_s2, w.R, s.F[row])
+    for k in range(N_NOMINAL):
+        w.x[k] = s.x_before[row, k]
+    s.decay[row] = bias_decay(w.x, s.dt, c)
+    strapdown(w.x, w.mean_imu[0:3], w.mean_imu[3:6], s.dt, c.gravity_m_s2, w.R, s.F[row])

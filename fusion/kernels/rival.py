@@ -14,7 +14,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Record
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import N_ERROR, N_NOMINAL
 
 Array = NDArray[np.float64]

@@ -31,7 +31,8 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import Health, Reason
 from axialnav.fusion.supervisor import MAX_STATES, STATE_BITS, SourceState
-from axialnav.models.jit import Record, Records, kernel
+from axialnav.models.jit import Record, Records
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_POS, E_VEL, N_ERROR, N_NOMINAL, POS, VEL
 
 Array = NDArray[np.float64]

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import correct, project
-from axialnav.models.jit import Integer, Record, kernel
+from axialnav.models.jit import Integer, Record
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_ACCEL_BIAS, E_ATT, E_VEL, N_ERROR, POS, VEL
 
 Array = NDArray[np.float64]

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.memory import TRACK_POS_CROSS, TRACK_STATE, TRACK_VARIANCE, TRACK_VEL_CROSS
-from axialnav.models.jit import Record, Records, kernel
+from axialnav.models.jit import Record, Records
 from axialnav.models.rotations import rotate_in_body
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, E_VEL, N_BIASES, N_ERROR, N_NOMINAL, QUAT
 from axialnav.models.tangent import inverse_right_jacobian, right_jacobian, rotation_between
 

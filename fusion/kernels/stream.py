@@ -17,7 +17,9 @@ from axialnav.fusion.kernels.run import run
 from axialnav.fusion.memory import LOG_WIDTH, MEMORY, SCRATCH, SETTINGS, SOURCE_MEMORY, TRACK_WIDTH
 from axialnav.fusion.ring import HEAD, INBOX, STRIDE
 from axialnav.fusion.sources import SOURCE
-from axialnav.models.jit import Record, Records, kernel
+from axialnav.models.jit import Record, Records
+from axialnav.models.jit import kernel as array_kernel
+from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,7 +32,7 @@ ADDRESSES = (
 WORD, REAL = np.dtype(np.int64), np.dtype(np.float64)
 
 
-@kernel
+@array_kernel  # the arrays are made here
 def take_at(block: Any) -> int:
     """Run :func:`take` on the arrays at the addresses in ``block``, in the order of ``ADDRESSES``.
 

@@ -21,8 +21,9 @@ from axialnav.fusion.kernels.tracker import path_length
 from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import BLOCK_S, BLOCKS
 from axialnav.fusion.supervisor import SourceState
-from axialnav.models.jit import Integer, Record, Records, kernel
+from axialnav.models.jit import Integer, Record, Records
 from axialnav.models.rotations import matrix_from_quaternion
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_POS, POS, QUAT
 
 Array = NDArray[np.float64]

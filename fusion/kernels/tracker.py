@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_TDOA
 from axialnav.fusion.memory import BLOCKS
 from axialnav.fusion.outcome import Reason
-from axialnav.models.jit import Integer, Record, kernel
+from axialnav.models.jit import Integer, Record
+from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 JUMP, STUCK, SUPERVISOR = int(Reason.JUMP), int(Reason.STUCK), int(Reason.SUPERVISOR)

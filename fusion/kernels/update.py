@@ -20,8 +20,9 @@ from axialnav.fusion.memory import (
     LOG_WIDTH,
 )
 from axialnav.fusion.outcome import Reason
-from axialnav.models.jit import Record, kernel
+from axialnav.models.jit import Record
 from axialnav.models.rotations import matrix_from_quaternion
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_VEL, N_ERROR, POS, QUAT, VEL
 
 Array = NDArray[np.float64]

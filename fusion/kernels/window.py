@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.memory import REMEMBERED
-from axialnav.models.jit import Integer, Record, kernel
+from axialnav.models.jit import Integer, Record
 from axialnav.models.rotations import matrix_from_quaternion, rotate_in_body
+from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import GYRO_BIAS, N_NOMINAL, POS, QUAT, VEL
 
 Array = NDArray[np.float64]

@@ -9,48 +9,69 @@ import sys
 from pathlib import Path
 
 import numba
+import pytest
 
 import axialnav
 from axialnav.models.jit import source_stamp
 
 CALLER = """from axialnav.models.inner import inner
-from axialnav.models.jit import kernel
+from {decorator} import kernel
 
 
 @kernel
 def outer(x):
     return inner(x)
 """
-INNER = "from axialnav.models.jit import kernel\n\n\n@kernel\ndef inner(x):\n    return {factor} * x\n"
+INNER = "from {decorator} import kernel\n\n\n@kernel\ndef inner(x):\n    return {factor} * x\n"
+DECORATORS = "axialnav.models.jit", "axialnav.models.scalar_kernel"
 
 
-def copy_of_the_package(folder: Path) -> Path:
+def copy_of_the_package(folder: Path, decorator: str = DECORATORS[0]) -> Path:
     root = Path(axialnav.__file__).resolve().parent.parent
     package = folder / "axialnav"
     for layer in ("models", "estimators", "fusion", "fusion/kernels"):
         (package / layer).mkdir(parents=True)
         (package / layer / "__init__.py").touch()
     (package / "__init__.py").touch()
-    (package / "models" / "jit.py").write_text((root / "models" / "jit.py").read_text())
-    (package / "models" / "outer.py").write_text(CALLER)
+    for name in ("jit.py", "one_module.py", "scalar_kernel.py"):
+        (package / "models" / name).write_text((root / "models" / name).read_text())
+    (package / "models" / "outer.py").write_text(CALLER.format(decorator=decorator))
     return package
 
 
-def outer_of_three(folder: Path) -> str:
-    code = "from axialnav.models.outer import outer; print(outer(3.0))"
+def outer_of_three(folder: Path, then: str = "print(outer(3.0))") -> str:
+    code = f"from axialnav.models.outer import outer; {then}"
     environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "cache")}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
 
-def test_a_change_in_a_called_function_is_seen(tmp_path: Path) -> None:
-    package = copy_of_the_package(tmp_path)
-    (package / "models" / "inner.py").write_text(INNER.format(factor=2.0))
+@pytest.mark.parametrize("decorator", DECORATORS)
+def test_a_change_in_a_called_function_is_seen(tmp_path: Path, decorator: str) -> None:
+    package = copy_of_the_package(tmp_path, decorator)
+    (package / "models" / "inner.py").write_text(INNER.format(factor=2.0, decorator=decorator))
     assert outer_of_three(tmp_path) == "6.0"
     assert outer_of_three(tmp_path) == "6.0"
-    (package / "models" / "inner.py").write_text(INNER.format(factor=20.0))
+    (package / "models" / "inner.py").write_text(INNER.format(factor=20.0, decorator=decorator))
     assert outer_of_three(tmp_path) == "60.0"
+
+
+def test_a_part_is_compiled_once_and_read_from_disk_for_another_whole(tmp_path: Path) -> None:
+    """A second caller of a kernel finds it on disk, and so does the kernel itself when Python calls it."""
+    decorator = DECORATORS[1]
+    package = copy_of_the_package(tmp_path, decorator)
+    (package / "models" / "inner.py").write_text(INNER.format(factor=2.0, decorator=decorator))
+    (package / "models" / "top.py").write_text(
+        CALLER.format(decorator=decorator).replace("inner", "outer").replace("def outer", "def top")
+    )
+    say = "print(outer(3.0), sum(inner.part.stats.cache_hits.values()), len(inner.part.stats.cache_misses))"
+    assert outer_of_three(tmp_path, f"from axialnav.models.inner import inner; {say}") == "6.0 0 1"
+    say = "from axialnav.models.top import top; print(top(3.0), outer.part.stats.cache_hits)"
+    assert outer_of_three(tmp_path, say).startswith("6.0 Counter()")  # not called from another kernel until now
+    (package / "models" / "top.py").write_text((package / "models" / "top.py").read_text() + "\n")
+    assert outer_of_three(tmp_path, "from axialnav.models.inner import inner; print(inner(4.0))") == "8.0"
+    assert outer_of_three(tmp_path) == "6.0"
 
 
 def test_the_stamp_sees_every_source(tmp_path: Path) -> None:
@@ -62,7 +83,7 @@ def test_the_stamp_sees_every_source(tmp_path: Path) -> None:
 
 def test_an_index_of_another_version_counts_as_empty(tmp_path: Path) -> None:
     package = copy_of_the_package(tmp_path)
-    (package / "models" / "inner.py").write_text(INNER.format(factor=2.0))
+    (package / "models" / "inner.py").write_text(INNER.format(factor=2.0, decorator=DECORATORS[0]))
     assert outer_of_three(tmp_path) == "6.0"
     for index in (tmp_path / "cache").rglob("*.nbi"):
         # a pickle that names something that is no longer there
