@@ -96,7 +96,7 @@ def _fly(flight: Flight, title: str) -> FieldFlight:
     rows = [_fused_row(title, "fused", fused)]
     if "uwb0" in flight.tables:
         rows.append(_fused_row(title, "UWB and IMU alone", replay(flight, without=("cam0",))))
-    stripes, error, windows = _stripes(flight)
+    stripes, error, windows = paper_speed(flight)
     rows.append(_stripes_row(title, error, windows))
     truth = flight.truth
     assert truth is not None
@@ -113,8 +113,8 @@ def _fused_row(title: str, name: str, run: Run) -> tuple[Cell, ...]:
     return (title, name, *(float(scores[key]) for key in keys), 1.0)
 
 
-def _stripes(flight: Flight) -> tuple[Curve, Array, int]:
-    """Speed by the paper's method from the true wall distance, its error, and the number of windows."""
+def paper_speed(flight: Flight) -> tuple[Curve, Array, int]:
+    """Speed by the paper's method from the true wall distance, its error [m/s], and the number of windows."""
     try:
         run = run_motion(flight, method="stripes", frames=5, undistort=False)
     except FrameError:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.replay.simulate.kernels import bring_nearer
 from axialnav.replay.simulate.mission import WallLook
 from axialnav.replay.simulate.optics import lens_taps
 from axialnav.replay.simulate.posed import Poses, WallPlane, Window, posed_light
@@ -105,7 +106,7 @@ class CorridorView:
         depths = np.full((len(groups), self._camera.height, self._camera.width), np.inf, dtype=np.float32)
         for depth, number in zip(depths, groups, strict=True):
             for index in self._group(number).facets:
-                np.minimum(depth, self._depth(self._world.facets[index], position, rotation), out=depth)
+                self._bring_nearer(self._world.facets[index], position, rotation, depth)
         return depths
 
     def _behind(self, pixels: NDArray[np.bool_], position: Array, rotation: Array) -> list[int]:
@@ -153,20 +154,16 @@ class CorridorView:
         places = np.clip(places, foot - reach, foot + reach)
         return places.min(axis=0) - MARGIN_PX, places.max(axis=0) + MARGIN_PX
 
-    def _depth(self, facet: Facet, position: Array, rotation_WS: Array) -> Image:
-        """Distance along the optical axis at which each pixel meets a piece [m], infinite where it does not."""
-        camera = self._camera
+    def _bring_nearer(self, facet: Facet, position: Array, rotation_WS: Array, depth: Image) -> None:
+        """Lower ``depth`` (h, w) [m] to that of a piece where the camera sees it."""
         height = float(facet.normal @ position - facet.offset_m)
-        cosine = _linear(-facet.normal @ rotation_WS, camera)
         if height <= 0.0:
-            return np.full(cosine.shape, np.inf, dtype=np.float32)
-        inside = cosine > 1e-6
-        along = np.roll(facet.corners, -1, axis=0) - facet.corners
-        for corner, edge in zip(facet.corners, along, strict=True):
-            inward = np.cross(facet.normal, edge)
-            slope = float(inward @ (position - corner))
-            inside &= slope * cosine + height * _linear(inward @ rotation_WS, camera) >= 0.0
-        return np.where(inside, height / np.maximum(cosine, 1e-6), np.inf).astype(np.float32)
+            return
+        cosine = -facet.normal @ rotation_WS
+        inward = np.cross(facet.normal, np.roll(facet.corners, -1, axis=0) - facet.corners)
+        slopes = np.einsum("ni,ni->n", inward, position - facet.corners)
+        edges = slopes[:, None] * cosine + height * inward @ rotation_WS
+        bring_nearer(np.vstack([cosine, edges]), height, self._camera.focal_px, depth)
 
     def _group(self, number: int) -> Group:
         if number not in self._groups:
@@ -183,14 +180,6 @@ def _rays(camera: CameraModel, u_px: Array, v_px: Array) -> Array:
     y = (v_px - 0.5 * (camera.height - 1)) / camera.focal_px
     rays = np.column_stack([x, y, np.ones_like(x)])
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
-
-
-def _linear(weights_S: Array, camera: CameraModel) -> Image:
-    """``weights . (x, y, 1)`` at every pixel's ray, shape (h, w)."""
-    u = (np.arange(camera.width) - 0.5 * (camera.width - 1)) / camera.focal_px
-    v = (np.arange(camera.height) - 0.5 * (camera.height - 1)) / camera.focal_px
-    across = (weights_S[0] * u + weights_S[2]).astype(np.float32)
-    return np.asarray(across[None, :] + (weights_S[1] * v).astype(np.float32)[:, None], dtype=np.float32)
 
 
 def _grouped(facets: tuple[Facet, ...]) -> list[int]:

@@ -1,4 +1,4 @@
-"""Compiled inner loops: row spectra times a transfer function, and resampling of a wall by a camera."""
+"""Compiled inner loops: row spectra times a transfer function, resampling of a wall, depth of a flat piece."""
 
 # mypy: disable-error-code="no-untyped-def,untyped-decorator"
 
@@ -109,3 +109,42 @@ def resample(wall, x_px, y_px, roll, yaw, focal_px, shift, left, top, density, o
                 line = wall[r - 1 + j]
                 total += wy[j] * (wx[0] * line[c - 1] + wx[1] * line[c] + wx[2] * line[c + 1] + wx[3] * line[c + 2])
             out[v, u] = total
+
+
+@numba.njit(cache=True)
+def bring_nearer(lines, height, focal_px, depth):  # pragma: no cover - compiled
+    """Lower ``depth`` to that of a flat convex piece where it is in view: in every row, one stretch of columns.
+
+    Parameters
+    ----------
+    lines
+        Linear forms ``a x + b y + c`` of a pixel's slopes (x, y), shape (n, 3): the cosine of the ray to the piece's
+        plane, then one per edge that is not negative inside of it.
+    height
+        Distance of the camera from the plane [m].
+    focal_px
+        Focal length [px].
+    depth
+        Distance along the optical axis [m], float32, shape (h, w).
+    """
+    rows, cols = depth.shape
+    for v in range(rows):
+        y = (v - 0.5 * (rows - 1)) / focal_px
+        low, high = 0.0, cols - 1.0
+        for k in range(lines.shape[0]):
+            rest = lines[k, 1] * y + lines[k, 2] - (1e-6 if k == 0 else 0.0)
+            slope = lines[k, 0]
+            if slope == 0.0:
+                if rest < 0.0:
+                    high = -1.0
+                continue
+            border = -rest / slope * focal_px + 0.5 * (cols - 1)
+            if slope > 0.0:
+                low = max(low, border)
+            else:
+                high = min(high, border)
+        if low <= high:
+            for u in range(int(np.ceil(low)), int(np.floor(high)) + 1):
+                x = (u - 0.5 * (cols - 1)) / focal_px
+                there = np.float32(height / (lines[0, 0] * x + lines[0, 1] * y + lines[0, 2]))
+                depth[v, u] = min(depth[v, u], there)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from axialnav.replay.simulate.textures import load_texture
 
@@ -144,12 +145,13 @@ def fractal_field(rows: int, cols: int, exponent: float, rng: np.random.Generato
     ``rows`` and ``cols`` in camera px; shape (rows, ``OVERSAMPLING`` * cols).
     """
     white = rng.standard_normal((rows, OVERSAMPLING * cols), dtype=np.float32)
-    spectrum = np.fft.rfft2(white)
-    fx = np.fft.rfftfreq(OVERSAMPLING * cols, 1.0 / OVERSAMPLING)[None, :]
-    fy = np.fft.fftfreq(rows)[:, None]
-    radius = np.hypot(fx, fy)
-    radius[0, 0] = np.inf
-    field = np.fft.irfft2(spectrum * radius ** (-0.5 * exponent), s=white.shape)
+    spectrum = fft.rfft2(white, overwrite_x=True)
+    fx = fft.rfftfreq(OVERSAMPLING * cols, 1.0 / OVERSAMPLING)[None, :].astype(np.float32)
+    fy = fft.fftfreq(rows)[:, None].astype(np.float32)
+    power = fx**2 + fy**2
+    power[0, 0] = np.inf
+    spectrum *= power ** np.float32(-0.25 * exponent)
+    field = fft.irfft2(spectrum, s=white.shape, overwrite_x=True)
     return np.asarray(field / field.std(), dtype=np.float32)
 
 

@@ -26,7 +26,10 @@ from axialnav.replay.simulate.world import World
 
 Array = NDArray[np.float64]
 LEVELS = {"bright": BRIGHT, "dim": DIM, "dark": DARK}
-PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
+PNG = [  # half the time of the defaults for a tenth more bytes: noise does not repeat itself
+    *(cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY),
+    *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB),
+]
 DROP_SHARE = 0.01
 FIRST_FRAME_S = 0.05
 SHAKE_HZ = (61.0, 87.0)
