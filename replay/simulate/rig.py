@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from axialnav.models.rig import AnySensor, AttitudeSource, Barometer, Camera, RangeFinder, Transform, Uwb, Vector3
 from axialnav.replay.simulate.mission import Mission
-from axialnav.replay.simulate.sensors.aiding import ATTITUDE_HZ, BARO_HZ
+from axialnav.replay.simulate.sensors.aiding import ATTITUDE_HZ, BARO_HZ, barometer_sigma_m, tilt_sigma_rad
 from axialnav.replay.simulate.sensors.imu import ImuSheet
 from axialnav.replay.simulate.sensors.tof import TofSheet
 
@@ -19,7 +19,6 @@ CAMERA_M = {"left": (0.05, 0.06, 0.0), "right": (0.05, -0.06, 0.0)}
 BEAM_M = {"left": (-0.03, 0.06, 0.02), "right": (-0.03, -0.06, 0.02)}
 BELOW_M = (0.0, 0.0, -0.05)
 ANTENNA_M = (0.0, 0.0, 0.10)
-BARO_SIGMA_M, ATTITUDE_SIGMA_RAD = 0.25, 0.015  # drift included
 TAKE_OFF_ANCHORS = ((-1.5, 0.9, 0.3), (-1.5, -0.9, 2.5), (1.5, 0.9, 2.5), (1.5, -0.9, 0.3))
 
 
@@ -44,8 +43,8 @@ def build_rig(
         "imu0": imu.spec(mission.vehicle.vibration_m_s2),
         "tof0": _range_finder(transform(side_axes(side), BEAM_M[side]), "wall", tof),
         "tof1": _range_finder(transform(DOWN, BELOW_M), "floor", tof),
-        "baro0": Barometer(rate_hz=BARO_HZ, sigma_m=BARO_SIGMA_M),
-        "att0": AttitudeSource(rate_hz=ATTITUDE_HZ, sigma_rad=ATTITUDE_SIGMA_RAD),
+        "baro0": Barometer(rate_hz=BARO_HZ, sigma_m=barometer_sigma_m("baro_doors" in mission.faults)),
+        "att0": AttitudeSource(rate_hz=ATTITUDE_HZ, sigma_rad=tilt_sigma_rad("attitude_drift" in mission.faults)),
     }
     if mission.uwb.condition != "none":
         rig["uwb0"] = Uwb(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,16 @@ BARO_HZ, BARO_SIGMA_M = 10.0, 0.10
 BARO_DOOR_M, BARO_DRIFT_S = 0.15, 30.0  # pressure that follows doors and propellers
 BARO_DATUM_M = 87.0
 NORTH_OF_X_RAD = 0.6  # heading of the corridor's x axis in the autopilot's north-east-down frame
+
+
+def tilt_sigma_rad(drifts: bool) -> float:
+    """Standard deviation of roll and pitch [rad], drift included."""
+    return round(math.hypot(ATTITUDE_SIGMA_RAD, ATTITUDE_DRIFT_RAD if drifts else 0.0), 4)
+
+
+def barometer_sigma_m(doors: bool) -> float:
+    """Standard deviation of the height [m], slow error included."""
+    return round(math.hypot(BARO_SIGMA_M, BARO_DOOR_M if doors else 0.0), 3)
 
 
 def read_attitude(motion: Motion, drifts: bool, rng: np.random.Generator) -> SensorTable:
