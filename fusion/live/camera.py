@@ -30,6 +30,8 @@ class Grabber:
         ``missing`` (periods without a picture).
     """
 
+    COUNTED = ("pictures", "unread", "repeated", "backwards", "gaps", "missing")
+
     def __init__(self, source: Source, rate_hz: float | None) -> None:
         self.counts: Counter[str] = Counter()
         self.mailbox: Mailbox[Picture] = Mailbox()
@@ -90,6 +92,8 @@ class MotionStage:
     counts
         ``measured``, ``refused`` (no motion to be believed) and ``unusable`` pictures.
     """
+
+    COUNTED = ("measured", "refused", "unusable")
 
     def __init__(
         self,

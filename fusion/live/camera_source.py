@@ -144,12 +144,16 @@ class V4l2Source:
         """Pictures for ever, after the first few, which are taken before the settings have settled."""
         number = 0
         while True:
-            if not self._capture.grab():
+            try:
+                if not self._capture.grab():
+                    yield None
+                    continue
+                arrival = self._clock()
+                stamp_ns = self._stamp(arrival)
+                good, image = self._capture.retrieve()
+            except cv2.error:  # OpenCV checks what the driver says, and some drivers say strange things
                 yield None
                 continue
-            arrival = self._clock()
-            stamp_ns = self._stamp(arrival)
-            good, image = self._capture.retrieve()
             number += 1
             if number <= SETTLING_FRAMES:
                 continue

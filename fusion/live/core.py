@@ -20,12 +20,15 @@ from axialnav.fusion.errors import FlightError, ReadingError
 from axialnav.fusion.memory import the_imu
 from axialnav.fusion.outcome import AxialState, Outcome, Verdict
 from axialnav.fusion.readings import ImuSample, Reading
+from axialnav.models.rig import BlurMeter, Camera, Flow, Imu, Uwb
 
 MAX_GAP_NS = 1_000_000_000  # without inertial samples for longer, nobody knows where the vehicle is
 MAX_SPEED_M_S = 100.0
 SIGMA_M, SIGMA_M_S, SIGMA_RAD = 0.5, 1.0, 0.2  # of a state that is taken over
 LONG_AGO_NS = -(2**62)
+SILENT_NS = 250_000_000
 LOCK_S = 0.05
+AXIAL = (BlurMeter, Camera, Flow, Uwb)
 ESTIMATORS: dict[str, type[CorridorEstimator]] = {"corridor": CorridorEstimator, "axial": AxialEstimator}
 
 
@@ -41,8 +44,8 @@ class Snapshot:
         Latest angular rate in body axes, bias removed, shape (3,).
     imu_ns
         Stamp of the newest inertial sample.
-    aid_ns
-        Arrival of the latest reading that was fused.
+    aid_ns, axial_ns
+        Arrival of the latest reading that was fused: of any, and of a sensor that sees the motion along the corridor.
     restarts
         How often the filter has been started again.
     """
@@ -51,6 +54,7 @@ class Snapshot:
     rate_rad_s: NDArray[np.float64]
     imu_ns: int
     aid_ns: int
+    axial_ns: int
     restarts: int
 
 
@@ -96,7 +100,8 @@ class FilterCore:
         self._lock = threading.Lock()
         self.began_ns: int | None = None
         self._imu: ImuSample | None = None
-        self._aid_ns = LONG_AGO_NS
+        self._fused_ns: dict[str, int] = {}  # arrival of each sensor's latest fused reading
+        self._axial: frozenset[str] = frozenset()
         self._count = 0
         self._last: AxialState | None = None
         self._sick = False
@@ -109,6 +114,9 @@ class FilterCore:
         if self._tap is not None:
             self._tap.restarted(config)
         self._rotation_BS = the_imu(config).rotation_BS
+        aids = {n: s for n, s in config.sensor.items() if n not in config.disabled and not isinstance(s, Imu)}
+        self._axial = frozenset(name for name, spec in aids.items() if isinstance(spec, AXIAL))
+        self._fused_ns = dict.fromkeys(aids, LONG_AGO_NS)
         return ESTIMATORS[self._kind](config)
 
     def push(self, reading: Reading, arrival_ns: int) -> Outcome | None:
@@ -128,7 +136,7 @@ class FilterCore:
                 if self._imu is None or reading.t_ns > self._imu.t_ns:
                     self._imu = reading
             elif outcome.verdict is Verdict.FUSED:
-                self._aid_ns = arrival_ns
+                self._fused_ns[reading.sensor] = arrival_ns
         self.verdicts[reading.sensor, outcome.verdict.name] += 1
         if self._tap is not None:
             self._tap.pushed(reading, outcome, arrival_ns)
@@ -153,11 +161,17 @@ class FilterCore:
             if state.velocity_valid:
                 self._last = state
             rate = self._rotation_BS @ np.array(self._imu.gyro_rad_s) - state.gyro_bias_rad_s
-            return Snapshot(state, rate, self._imu.t_ns, self._aid_ns, self._count)
+            aid_ns = max(self._fused_ns.values(), default=LONG_AGO_NS)
+            axial_ns = max((self._fused_ns[name] for name in self._axial), default=LONG_AGO_NS)
+            return Snapshot(state, rate, self._imu.t_ns, aid_ns, axial_ns, self._count)
         except (NotStartedError, PastStateError):
             return None
         finally:
             self._lock.release()
+
+    def silent(self, now_ns: int) -> list[str]:
+        """Sensors of which nothing has been fused for a quarter of a second."""
+        return sorted(name for name, t_ns in self._fused_ns.items() if now_ns - t_ns > SILENT_NS)
 
     def _watch(self, reading: Reading) -> None:
         if self._sick:
@@ -172,7 +186,7 @@ class FilterCore:
         self._sick, self._last = False, None
         self.restarts[reason] += 1
         self._count += 1
-        self._imu, self._aid_ns, self.began_ns = None, LONG_AGO_NS, None
+        self._imu, self.began_ns = None, None
         self._estimator = self._new(last, max(gap_s, 0.0))
 
 

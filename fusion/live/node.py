@@ -1,4 +1,4 @@
-"""The node: one thread per wire, one for the filter, one to speak; bounded ways between them; a clean end."""
+"""The node: one thread for all wires and the filter, one to speak, two for the camera; bounded ways between them."""
 
 from __future__ import annotations
 
@@ -20,23 +20,40 @@ from axialnav.fusion.live.recording import FlightRecording
 from axialnav.fusion.live.security import read_key
 from axialnav.fusion.live.sender import Sender
 from axialnav.fusion.live.status import StatusServer, status_line
-from axialnav.fusion.live.transport import Link, open_link
+from axialnav.fusion.live.transport import Address, Link, open_link
 from axialnav.fusion.live.vehicle import Vehicle
-from axialnav.fusion.outcome import Verdict
+from axialnav.fusion.live.wires import Wires
+from axialnav.fusion.outcome import Outcome, Verdict
 from axialnav.fusion.readings import PixelMotion, Reading
 
-CAPACITY = 2048  # readings: several seconds of everything
+CAPACITY = 64  # motions: two seconds
+AT_ONCE = 16
 TICK_S = 0.02
 JOIN_S = 2.0
 
 
-class Item(NamedTuple):
-    """Something on its way to the filter: a reading, or the order to start anew."""
+class Seen(NamedTuple):
+    """Image motion on its way to the filter, and when it was measured and its last picture had come [ns]."""
 
-    reading: Reading | None
-    restart: str
-    arrival_ns: int
-    picture_ns: int | None
+    motion: PixelMotion
+    measured_ns: int
+    picture_ns: int
+
+
+class MavlinkWire:
+    """The link to the autopilot as one of the wires."""
+
+    def __init__(self, link: Link, take: Callable[[bytes, Address | None], None]) -> None:
+        self._link, self._take = link, take
+        self.fileno, self.reopen = link.fileno, link.reopen
+
+    def ready(self) -> None:
+        """Take what has arrived, a limited number of datagrams so that the other wires have their turn."""
+        for _ in range(AT_ONCE):
+            data, address = self._link.receive()
+            if not data:
+                return
+            self._take(data, address)
 
 
 class Node:
@@ -76,7 +93,7 @@ class Node:
         self.failure: str = ""
         self.latency = {"queue": Latency(), "filter": Latency()}
         self._vehicle, self._clock, self._say, self._recording = vehicle, clock, say, recording
-        self._queue: BoundedQueue[Item] = BoundedQueue(CAPACITY)
+        self._queue: BoundedQueue[Seen] = BoundedQueue(CAPACITY)
         self._threads: list[threading.Thread] = []
         self._sentence = ""
         self._receiver = Receiver(vehicle.mavlink.allow, key=key)
@@ -98,6 +115,7 @@ class Node:
         self._motion: MotionStage | None = None
         if vehicle.camera is not None and source is not None:
             self._add_camera(vehicle.camera.sensor, source)
+        self._wires = Wires([MavlinkWire(self._link, self._receive), *self._lines], self._take_motions)
         self._server = StatusServer(vehicle.status.port, self.status) if vehicle.status.port else None
 
     def _add_camera(self, sensor: str, source: Source) -> None:
@@ -109,12 +127,11 @@ class Node:
     def start(self) -> None:
         """Start every thread."""
         bodies: dict[str, Callable[[threading.Event], None]] = {
-            "receive": self._receive,
-            "filter": self._filter,
+            "wires": self._wires.run,
+            "plugs": self._wires.keep_open,
             "output": self.output.run,
             "tick": self._tick,
         }
-        bodies |= {f"nooploop{k}": line.run for k, line in enumerate(self._lines)}
         if self._grabber is not None and self._motion is not None:
             bodies |= {"camera": self._grabber.run, "motion": self._motion.run}
         if self._server is not None:
@@ -139,6 +156,8 @@ class Node:
             if thread is not threading.current_thread():
                 thread.join(JOIN_S)
         self._link.close()
+        for line in self._lines:
+            line.close()
         if self._recording is not None:
             self._recording.close()
 
@@ -171,7 +190,7 @@ class Node:
                 "sent": dict(self._sender.counts),
                 "unsent": self._link.unsent,
             },
-            "filter": self._filter_status(),
+            "filter": self._filter_status(now),
             "camera": self._camera_status(),
             "recording": self._recording.status() if self._recording else None,
             "nooploop": {
@@ -191,7 +210,7 @@ class Node:
             "reset_counter": out.reset_counter,
         }
 
-    def _filter_status(self) -> dict[str, Any]:
+    def _filter_status(self, now_ns: int) -> dict[str, Any]:
         verdicts: dict[str, dict[str, int]] = {}
         for (sensor, verdict), count in list(self.core.verdicts.items()):
             verdicts.setdefault(sensor, {})[verdict] = count
@@ -200,6 +219,7 @@ class Node:
             "refused": dict(self.core.refused),
             "restarts": dict(self.core.restarts),
             "began_ns": self.core.began_ns,
+            "silent": self.core.silent(now_ns),
             "waiting": len(self._queue),
             "dropped": self._queue.dropped,
         }
@@ -207,7 +227,8 @@ class Node:
     def _camera_status(self) -> dict[str, Any] | None:
         if self._grabber is None or self._motion is None:
             return None
-        counts = {**self._grabber.counts, **self._motion.counts, "overwritten": self._grabber.mailbox.dropped}
+        counts = dict.fromkeys((*Grabber.COUNTED, *MotionStage.COUNTED), 0) | self._grabber.counts
+        counts |= {**self._motion.counts, "overwritten": self._grabber.mailbox.dropped}
         return {**counts, "rate_hz": self._grabber.rate_hz, "ended": self._grabber.ended}
 
     def _processor_s(self) -> dict[str, float]:
@@ -227,45 +248,41 @@ class Node:
             self.failure = self.failure or f"thread {name}: {type(error).__name__}: {error}"
             self.stop.set()
 
-    def _receive(self, stop: threading.Event) -> None:
-        while not stop.is_set():
-            data, address = self._link.receive(0.05)
-            if not data:
-                continue
-            arrival_ns = self._clock()
-            if self._recording is not None:
-                self._recording.heard("mavlink_in", data, arrival_ns)
-            messages = self._receiver.feed(data, arrival_ns)
-            if messages:
-                self._link.confirm(address)
-            for message in messages:
-                reading = self.autopilot.take(message, arrival_ns)
-                if reading is not None:
-                    self._deliver(reading, arrival_ns)
+    def _receive(self, data: bytes, address: Address | None) -> None:
+        arrival_ns = self._clock()
+        if self._recording is not None:
+            self._recording.heard("mavlink_in", data, arrival_ns)
+        messages = self._receiver.feed(data, arrival_ns)
+        if messages:
+            self._link.confirm(address)
+        for message in messages:
+            reading = self.autopilot.take(message, arrival_ns)
+            if reading is not None:
+                self._deliver(reading, arrival_ns)
 
-    def _deliver(self, reading: Reading, arrival_ns: int) -> None:
-        self._queue.put(Item(reading, "", arrival_ns, None))
+    def _deliver(self, reading: Reading, arrival_ns: int) -> Outcome | None:
+        """Take a reading to the filter; from the thread of the wires only."""
+        began_ns = self._clock()
+        self.latency["queue"].add((began_ns - arrival_ns) * 1e-9)
+        outcome = self.core.push(reading, arrival_ns)
+        self.latency["filter"].add((self._clock() - began_ns) * 1e-9)
+        return outcome
 
     def _deliver_motion(self, motion: PixelMotion, picture: Picture) -> None:
-        self._queue.put(Item(motion, "", self._clock(), picture.arrival_ns))
+        self._queue.put(Seen(motion, self._clock(), picture.arrival_ns))
+        self._wires.wake()
+
+    def _take_motions(self) -> None:
+        while len(self._queue):
+            seen = self._queue.take(0.0)
+            if seen is None:
+                return
+            outcome = self._deliver(seen.motion, seen.measured_ns)
+            if outcome is not None and outcome.verdict is Verdict.FUSED:
+                self.output.frame_fused(seen.picture_ns)
 
     def _restart(self, reason: str) -> None:
-        self._queue.put(Item(None, reason, self._clock(), None))
-
-    def _filter(self, stop: threading.Event) -> None:
-        while not stop.is_set():
-            item = self._queue.take(0.05)
-            if item is None:
-                continue
-            if item.reading is None:
-                self.core.restart(item.restart, item.arrival_ns)
-                continue
-            began_ns = self._clock()
-            self.latency["queue"].add((began_ns - item.arrival_ns) * 1e-9)
-            outcome = self.core.push(item.reading, item.arrival_ns)
-            self.latency["filter"].add((self._clock() - began_ns) * 1e-9)
-            if item.picture_ns is not None and outcome is not None and outcome.verdict is Verdict.FUSED:
-                self.output.frame_fused(item.picture_ns)
+        self.core.restart(reason, self._clock())
 
     def _tick(self, stop: threading.Event) -> None:
         line_ns = round(self._vehicle.status.line_s * 1e9)

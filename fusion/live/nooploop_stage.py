@@ -1,8 +1,7 @@
-"""Nooploop modules on serial lines: a thread each, from bytes to readings of the filter's sensors."""
+"""Nooploop modules on serial lines: from bytes to readings of the filter's sensors."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -23,7 +22,7 @@ class NooploopStage:
     def __init__(
         self,
         line: Nooploop,
-        deliver: Callable[[Reading, int], None],
+        deliver: Callable[[Reading, int], object],
         clock: Callable[[], int],
         see: Callable[[str, bytes, int], None] | None = None,
     ) -> None:
@@ -40,12 +39,22 @@ class NooploopStage:
         )
         self._count = 0
 
-    def run(self, stop: threading.Event) -> None:
-        """Read until told to stop; the body of the line's thread."""
-        while not stop.is_set():
-            arrival_ns, data = self._port.read()
-            if data:
-                self.feed(data, arrival_ns)
+    def fileno(self) -> int | None:
+        """File to wait for; None while the port is away."""
+        return self._port.fileno()
+
+    def ready(self) -> None:
+        """Take what has arrived."""
+        arrival_ns, data = self._port.read()
+        if data:
+            self.feed(data, arrival_ns)
+
+    def reopen(self) -> None:
+        """Open the port if it is closed."""
+        self._port.reopen()
+
+    def close(self) -> None:
+        """Close the port."""
         self._port.close()
 
     def feed(self, data: bytes, arrival_ns: int) -> None:

@@ -151,7 +151,12 @@ class Output:
         return position_delta(before, now)
 
     def _quality(self, now: Snapshot) -> int:
-        """Per cent, 100 for a sigma of zero, 1 at the limit: 0 would read as "unknown"."""
+        """Per cent, 100 for a sigma of zero; 1 at the limit, or while nothing that sees the axis is fused.
+
+        0 would read as "unknown".
+        """
+        if now.state.t_ns - now.axial_ns > self._rules.aid_stale_s * 1e9:
+            return 1
         share = 1.0 - self._sigma(now) / self._rules.max_sigma_velocity_m_s
         return max(round(100.0 * share), 1)
 

@@ -84,10 +84,12 @@ def status_line(status: dict[str, Any]) -> str:
         speed = "no state yet"
     else:
         speed = f"v {state['axial_velocity_m_s']:+.2f} +-{state['sigma_axial_velocity_m_s']:.2f} m/s"
+    silent = status["filter"]["silent"]
+    without = f", without {', '.join(silent)}" if state is not None and silent else ""
     p99 = status["latency"]["queue"]["p99_ms"]
     behind = "-" if p99 is None else f"{p99:.1f} ms"
     return (
-        f"{speed} | sent {output['sent']} (reset {output['reset_counter']}) | "
+        f"{speed}{without} | sent {output['sent']} (reset {output['reset_counter']}) | "
         f"lost {sum(status['link']['lost'].values())}, damaged {status['link']['counts'].get('damaged', 0)}, "
         f"queue {behind} | {status['sentence']}"
     )

@@ -11,7 +11,6 @@ A port that is unplugged comes back by itself; what could not be sent is counted
 
 from __future__ import annotations
 
-import select
 import socket
 from typing import Protocol
 
@@ -28,8 +27,14 @@ class Link(Protocol):
 
     unsent: int
 
-    def receive(self, timeout_s: float) -> tuple[bytes, Address | None]:
-        """Next bytes and where they came from; empty after ``timeout_s``."""
+    def fileno(self) -> int | None:
+        """File to wait for; None while the port is away."""
+
+    def receive(self) -> tuple[bytes, Address | None]:
+        """Next bytes and where they came from, without waiting; empty if there are none."""
+
+    def reopen(self) -> None:
+        """Bring the port back if it is away."""
 
     def send(self, data: bytes) -> bool:
         """Send; False where nobody is known yet or the port is gone."""
@@ -81,15 +86,19 @@ class UdpLink:
         """Local port."""
         return int(self._socket.getsockname()[1])
 
-    def receive(self, timeout_s: float) -> tuple[bytes, Address | None]:
+    def fileno(self) -> int | None:
+        """The socket's file."""
+        return self._socket.fileno()
+
+    def receive(self) -> tuple[bytes, Address | None]:
         """Next datagram and its sender."""
-        ready, _, _ = select.select([self._socket], [], [], timeout_s)
-        if not ready:
-            return b"", None
         try:
             return self._socket.recvfrom(MAX_DATAGRAM)
-        except OSError:  # an earlier datagram of ours met a closed port
+        except OSError:  # none has come, or an earlier one of ours met a closed port
             return b"", None
+
+    def reopen(self) -> None:
+        """A socket stays open."""
 
     def send(self, data: bytes) -> bool:
         """Send one datagram to the peer."""
@@ -119,9 +128,17 @@ class SerialLink:
         self.unsent = 0
         self._port = SerialPort(device, baud)
 
-    def receive(self, timeout_s: float) -> tuple[bytes, Address | None]:
-        """Whatever has arrived; waits as long as the port was told to."""
+    def fileno(self) -> int | None:
+        """The port's file; None while it is unplugged."""
+        return self._port.fileno()
+
+    def receive(self) -> tuple[bytes, Address | None]:
+        """Whatever has arrived."""
         return self._port.read()[1], None
+
+    def reopen(self) -> None:
+        """Open the port if it is closed."""
+        self._port.reopen()
 
     def send(self, data: bytes) -> bool:
         """Write ``data`` or count it as unsent."""

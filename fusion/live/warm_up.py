@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
 from axialnav.fusion.camera_feed import CameraFeed
@@ -38,6 +39,10 @@ from axialnav.models.rig import (
 )
 
 STEP_NS = 10_000_000
+USUAL_CAMERA_HZ = 30.0
+STEP_PX = 3
+CONTRAST = 30.0
+ROUGHNESS = 0.03  # cycles a pixel, up to which the wall has all its texture
 
 
 def warm_up(config: Config, kind: str) -> None:
@@ -58,7 +63,7 @@ def warm_up(config: Config, kind: str) -> None:
         estimator.state(steps * STEP_NS)
     for name, spec in config.sensor.items():
         if isinstance(spec, Camera) and spec.surface is not None:
-            _warm_camera(config, name, spec)
+            warm_camera(config, name, spec)
 
 
 def _readings(config: Config, t_ns: int, aids: bool) -> Iterator[Reading]:
@@ -92,11 +97,24 @@ def _aid(name: str, spec: AnySensor, t_ns: int) -> Iterator[Reading]:
             yield UwbTdoa(t_ns=t_ns, sensor=name, anchor_a=first, anchor_b=second, difference_m=0.0)
 
 
-def _warm_camera(config: Config, name: str, spec: Camera) -> None:
-    feed = CameraFeed(config)
-    width, height = spec.resolution
-    noise = np.random.Generator(np.random.PCG64(0)).integers(0, 256, (height, width + 64), dtype=np.uint8)
-    period_ns = round(1e9 / (spec.rate_hz or 30.0))
-    for k in range(config.camera.frames + 1):
-        with suppress(FrameError):
-            feed.push(CameraFrame(t_ns=k * period_ns, sensor=name, image=noise[:, 3 * k : 3 * k + width].copy()))
+def warm_camera(config: Config, name: str, spec: Camera) -> None:
+    """Measure the motion of a made-up wall: of pictures that are refused early, little would be compiled."""
+    period_ns = round(1e9 / (spec.rate_hz or USUAL_CAMERA_HZ))
+    for exposure_s in (None, 0.3e-9 * period_ns):
+        feed = CameraFeed(config)
+        for k, image in enumerate(wall_pictures(spec.resolution, config.camera.frames + 2)):
+            with suppress(FrameError):
+                feed.push(CameraFrame(t_ns=k * period_ns, sensor=name, image=image, exposure_s=exposure_s))
+
+
+def wall_pictures(resolution: tuple[int, int], count: int) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of a rough wall that passes by, shape (height, width), each with its own noise."""
+    width, height = resolution
+    rng = np.random.Generator(np.random.PCG64(0))
+    texture = np.fft.rfft2(rng.normal(size=(height, width + STEP_PX * count)))
+    down, along = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(width + STEP_PX * count)[None, :]
+    wall = np.fft.irfft2(texture / (1.0 + (down**2 + along**2) / ROUGHNESS**2), s=(height, width + STEP_PX * count))
+    wall *= CONTRAST / wall.std()
+    for k in range(count):
+        seen = 128.0 + wall[:, STEP_PX * k : STEP_PX * k + width] + rng.normal(0.0, 1.0, (height, width))
+        yield np.clip(seen, 0.0, 255.0).astype(np.uint8)

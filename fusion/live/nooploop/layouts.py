@@ -60,6 +60,7 @@ def counted(count_at: int, node: int) -> Callable[[memoryview], int]:
     """Size of frames whose length field has to agree with a count of nodes of equal size."""
 
     def size(view: memoryview) -> int:
+        """Length of the frame, MORE or REFUSED."""
         if len(view) < 4:
             return MORE
         length: int = struct.unpack_from("<H", view, 2)[0]
@@ -80,6 +81,7 @@ def walked(count_at: int, head: int, step: Callable[[memoryview, int], int]) -> 
     """
 
     def size(view: memoryview) -> int:
+        """Length of the frame, MORE or REFUSED."""
         if len(view) < 4:
             return MORE
         length: int = struct.unpack_from("<H", view, 2)[0]

@@ -10,12 +10,14 @@ from typing import BinaryIO
 import serial
 
 READ_BYTES = 4096
-FIRST_WAIT_S = 0.1
-LONGEST_WAIT_S = 2.0
+FIRST_WAIT_NS = 100_000_000
+LONGEST_WAIT_NS = 1_000_000_000
 
 
 class SerialPort:
     """A serial port that survives being unplugged.
+
+    One thread reads; another may call :meth:`reopen`, which brings the port back.
 
     Parameters
     ----------
@@ -23,10 +25,8 @@ class SerialPort:
         Path of the device; prefer one below ``/dev/serial/by-id``, whose name stays the same.
     baud
         921600 for LinkTrack and TOFSense as delivered.
-    timeout_s
-        Longest time that one :meth:`read` waits.
-    clock_ns, sleep
-        The vehicle's monotonic clock and how to wait.
+    clock_ns
+        The vehicle's monotonic clock.
 
     Attributes
     ----------
@@ -34,19 +34,10 @@ class SerialPort:
         How often the port went away.
     """
 
-    def __init__(
-        self,
-        device: str,
-        baud: int = 921600,
-        *,
-        timeout_s: float = 0.05,
-        clock_ns: Callable[[], int] = time.monotonic_ns,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
-        self._device, self._baud, self._timeout_s = device, baud, timeout_s
-        self._clock_ns, self._sleep = clock_ns, sleep
+    def __init__(self, device: str, baud: int = 921600, *, clock_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        self._device, self._baud, self._clock_ns = device, baud, clock_ns
         self._port: serial.Serial | None = None
-        self._wait_s = FIRST_WAIT_S
+        self._wait_ns, self._next_ns = FIRST_WAIT_NS, 0
         self.lost = 0
 
     @property
@@ -54,23 +45,35 @@ class SerialPort:
         """Whether the port is open."""
         return self._port is not None
 
+    def fileno(self) -> int | None:
+        """File to wait for; None while the port is away."""
+        port = self._port
+        return port.fd if port is not None else None
+
     def read(self) -> tuple[int, bytes]:
-        """Time of arrival [ns] and what came, which is nothing after ``timeout_s`` or while the port is away."""
-        if self._port is None and not self._open():
-            self._sleep(self._wait_s)
-            self._wait_s = min(2.0 * self._wait_s, LONGEST_WAIT_S)
+        """Time of arrival [ns] and what has come, without waiting."""
+        port = self._port
+        if port is None:
             return self._clock_ns(), b""
-        assert self._port is not None
         try:
-            data = self._port.read(1)
-            t_ns = self._clock_ns()
-            if data:
-                data += self._port.read(min(self._port.in_waiting, READ_BYTES))
+            data = port.read(READ_BYTES)
         except (OSError, TypeError):  # pyserial raises TypeError where the descriptor vanishes while it reads
             self.close()
             self.lost += 1
-            return self._clock_ns(), b""
-        return t_ns, data
+            data = b""
+        return self._clock_ns(), data
+
+    def reopen(self) -> None:
+        """Open the port if it is closed; after every failure wait longer before the next try."""
+        if self._port is not None or self._clock_ns() < self._next_ns:
+            return
+        try:
+            self._port = serial.Serial(self._device, self._baud, timeout=0)
+        except (OSError, ValueError):
+            self._next_ns = self._clock_ns() + self._wait_ns
+            self._wait_ns = min(2 * self._wait_ns, LONGEST_WAIT_NS)
+            return
+        self._wait_ns = FIRST_WAIT_NS
 
     def write(self, data: bytes) -> bool:
         """Send, for modules that answer queries; False while the port is away."""
@@ -85,21 +88,13 @@ class SerialPort:
         return True
 
     def close(self) -> None:
-        """Close the port; :meth:`read` opens it again."""
+        """Close the port; :meth:`reopen` opens it again."""
         if self._port is not None:
             port, self._port = self._port, None
             try:
                 port.close()
             except OSError:
                 return
-
-    def _open(self) -> bool:
-        try:
-            self._port = serial.Serial(self._device, self._baud, timeout=self._timeout_s)
-        except (OSError, ValueError):
-            return False
-        self._wait_s = FIRST_WAIT_S
-        return True
 
 
 def dump_blocks(source: str | Path | BinaryIO, block_bytes: int = READ_BYTES) -> Iterator[bytes]:

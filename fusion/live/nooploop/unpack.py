@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from typing import TypeVar
 
 from axialnav.fusion.live.nooploop import frames as f
 from axialnav.fusion.live.nooploop.fields import (
@@ -22,6 +23,7 @@ from axialnav.fusion.live.nooploop.fields import (
 IOT_NODES = 10
 IOT_BYTES = 160
 UNAVAILABLE_M = -8000.0
+R = TypeVar("R", f.NodeFrame3, f.AoaNodeFrame0, f.NodeFrame5)
 
 
 def tag_frame0(data: bytes) -> f.TagFrame0:
@@ -139,40 +141,33 @@ def node_frame2(data: bytes) -> f.NodeFrame2:
     )
 
 
+def _ranges_frame(kind: type[R], data: bytes, step: int, id_bytes: int = 1, extra: int = 0) -> R:
+    """Frames of one shape: role, number, both clocks, voltage, then nodes of ``step`` bytes behind their count."""
+    after = 5 + id_bytes
+    first = after + 15
+    return kind(
+        role=data[4],
+        id=int.from_bytes(data[5:after], "little"),
+        local_time_ms=u32(data, after),
+        system_time_ms=u32(data, after + 4),
+        voltage_v=u16(data, after + 12) / 1000.0,
+        ranges=tuple(_range(data, at, id_bytes, extra) for at in range(first, first + step * data[first - 1], step)),
+    )
+
+
 def node_frame3(data: bytes) -> f.NodeFrame3:
     """LinkTrack Node_Frame3."""
-    return f.NodeFrame3(
-        role=data[4],
-        id=data[5],
-        local_time_ms=u32(data, 6),
-        system_time_ms=u32(data, 10),
-        voltage_v=u16(data, 18) / 1000.0,
-        ranges=tuple(_range(data, at) for at in range(21, 21 + 7 * data[20], 7)),
-    )
+    return _ranges_frame(f.NodeFrame3, data, 7)
 
 
 def aoa_node_frame0(data: bytes) -> f.AoaNodeFrame0:
     """LinkTrack AOA Node_Frame0."""
-    return f.AoaNodeFrame0(
-        role=data[4],
-        id=data[5],
-        local_time_ms=u32(data, 6),
-        system_time_ms=u32(data, 10),
-        voltage_v=u16(data, 18) / 1000.0,
-        ranges=tuple(_range(data, at, extra=2) for at in range(21, 21 + 11 * data[20], 11)),
-    )
+    return _ranges_frame(f.AoaNodeFrame0, data, 11, extra=2)
 
 
 def node_frame5(data: bytes) -> f.NodeFrame5:
     """LinkTrack Node_Frame5."""
-    return f.NodeFrame5(
-        role=data[4],
-        id=u32(data, 5),
-        local_time_ms=u32(data, 9),
-        system_time_ms=u32(data, 13),
-        voltage_v=u16(data, 21) / 1000.0,
-        ranges=tuple(_range(data, at, id_bytes=4) for at in range(24, 24 + 10 * data[23], 10)),
-    )
+    return _ranges_frame(f.NodeFrame5, data, 10, id_bytes=4)
 
 
 def node_frame4(data: bytes) -> f.NodeFrame4:

@@ -116,12 +116,14 @@ def _format(fields: tuple[Field, ...], lengths: list[int]) -> str:
     codes, place = ["<"], 0
 
     def put(code: str, size: int, times: int = 1) -> None:
+        """Add numbers of ``size`` bytes, aligned."""
         nonlocal place
         pad = -place % size
         codes.append("x" * pad + (code if times == 1 else f"{times}{code}"))
         place += pad + size * times
 
     def walk(members: tuple[Field, ...]) -> None:
+        """Add the fields of a message."""
         nonlocal place
         for member in members:
             if member.kind == "message":

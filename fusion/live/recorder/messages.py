@@ -226,6 +226,7 @@ def _status(state: AxialState) -> list[Any]:
 
 def _outcome(outcome: Outcome) -> list[Any]:
     def padded(values: tuple[float, ...]) -> list[float]:
+        """Three numbers, NaN where there are fewer."""
         return [*values[:3], *[math.nan] * (3 - len(values[:3]))]
 
     gate = (outcome.nis, outcome.gate, outcome.weight)

@@ -13,10 +13,9 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import msgspec
-
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import FlightError
+from axialnav.fusion.live.recorder.limits import Limits, RecorderStatus
 from axialnav.fusion.live.recorder.messages import DEFINITIONS, Encoder, Message, MessageEncoder
 from axialnav.fusion.live.recorder.sink import CHUNK_BYTES, McapSink
 from axialnav.fusion.readings import CameraFrame, Reading
@@ -26,44 +25,8 @@ LOG_CHANNEL = "recorder/log"
 FLUSH_S = 1.0
 POLL_S = 0.05
 MESSAGE_COST = 400
-
-
-class RecorderStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """What a recorder has done so far.
-
-    Attributes
-    ----------
-    written, dropped
-        Channel -> messages on disk, and messages given up.
-    reasons
-        Why messages were given up -> how many.
-    bytes_written
-        Size of the file.
-    queued
-        Messages that wait.
-    recording, pictures
-        Whether messages, and whether pictures, are being written at the moment.
-    problem
-        The latest trouble in words, empty if there was none.
-    """
-
-    written: dict[str, int]
-    dropped: dict[str, int]
-    reasons: dict[str, int]
-    bytes_written: int
-    queued: int
-    recording: bool
-    pictures: bool
-    problem: str
-
-
-class Limits(msgspec.Struct, frozen=True, kw_only=True):
-    """How much a recorder may keep in memory and must leave on the disk, in bytes."""
-
-    picture_queue: int = 64 << 20
-    queue: int = 64 << 20
-    picture_reserve: int = 256 << 20
-    reserve: int = 16 << 20
+CLOSED, FULL, NEARLY_FULL = "recorder closed", "disk full", "disk nearly full"
+CONSEQUENCES = (CLOSED, FULL, NEARLY_FULL)  # of what has been said before, in more words
 
 
 class Recorder:
@@ -141,7 +104,7 @@ class Recorder:
         cost = _cost(message)
         with self._lock:
             if self._stop.is_set():
-                return self._give_up(channel, "recorder closed")
+                return self._give_up(channel, CLOSED)
             if is_picture and self._picture_cost + cost > self._limits.picture_queue:
                 return self._give_up(channel, "disk too slow")
             if not is_picture and self._cost + cost > self._limits.queue:
@@ -184,7 +147,7 @@ class Recorder:
         """Count a loss; the lock is held."""
         self._dropped[channel] += 1
         self._reasons[reason] += 1
-        if reason != "recorder closed":
+        if reason not in CONSEQUENCES:
             self._problem = reason
         return False
 
@@ -215,9 +178,9 @@ class Recorder:
 
     def _store(self, channel: str, t_ns: int, message: Message) -> None:
         if not self._recording:
-            self._lose(channel, "disk full")
+            self._lose(channel, FULL)
         elif isinstance(message, CameraFrame) and not self._pictures:
-            self._lose(channel, "disk nearly full")
+            self._lose(channel, NEARLY_FULL)
         else:
             self._add(channel, t_ns, message)
             if self._sink.pending_bytes > CHUNK_BYTES:
@@ -303,6 +266,7 @@ def _default_pictures() -> Encoder:
     encoders: list[Encoder] = []
 
     def encode(frame: CameraFrame) -> tuple[str, bytes]:
+        """Format and bytes of a picture."""
         if not encoders:
             from axialnav.fusion.live.camera_codec import PictureEncoder
 

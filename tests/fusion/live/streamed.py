@@ -1,4 +1,4 @@
-"""A vehicle on loopback: a made flight streamed as MAVLink over UDP and as NLink over pseudo-terminals, in real time.
+"""A vehicle on loopback: a flight streamed as MAVLink over UDP and as NLink over pseudo-terminals, in real time.
 
 The autopilot's boot clock runs on its own; datagrams and serial bytes are late, lost, out of order, damaged as asked.
 """
@@ -13,8 +13,9 @@ import threading
 import time
 import tty
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -25,8 +26,9 @@ from scipy.spatial.transform import Rotation
 from axialnav.fusion.batch import run_batch
 from axialnav.fusion.config import Config
 from axialnav.fusion.live.vehicle import Inputs, Mavlink, Nooploop, Output, Status, Vehicle
+from axialnav.models.rig import RangeFinder, Uwb
 from tests.fusion.live.contract import Contract, ContractArduPilot
-from tests.fusion.made_flights import FOCAL_PX, MadeFlight, Scene, Table, fly, motion
+from tests.fusion.made_flights import FOCAL_PX, Motion, Scene, Table, fly, motion
 
 FLIP = np.array([1.0, -1.0, -1.0])
 FLAGS_NAVIGATING = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
@@ -45,19 +47,46 @@ class Air:
     seed: int = 0
 
 
-def streamed_flight(scene: Scene = SCENE) -> MadeFlight:
+@dataclass(frozen=True)
+class Course:
+    """What is streamed: readings, the configuration for them, and the truth at any instant [s]."""
+
+    tables: Mapping[str, Table]
+    config: Config
+    duration_s: float
+    motion: Callable[[np.ndarray], Motion]
+
+    @property
+    def first_ns(self) -> int:
+        """Stamp of the first inertial sample, from which flight time counts."""
+        return int(self.tables["imu0"].t_ns[0])
+
+
+def streamed_flight(scene: Scene = SCENE) -> Course:
     """A made flight whose anchors have the numbers that LinkTrack gives them, level and heading along the corridor."""
     flight = fly(scene)
-    data = flight.config.to_dict()
+    return Course(flight.tables, with_numbers(flight.config), scene.duration_s, partial(motion, scene))
+
+
+def with_numbers(config: Config) -> Config:
+    """The configuration with its anchors numbered in their order."""
+    data = config.to_dict()
     for sensor in data["sensor"].values():
         if sensor["kind"] == "uwb":
-            sensor["anchors"] = {str(i): list(place) for i, place in enumerate(scene.anchors.values())}
-    return replace(flight, config=Config.from_dict(data))
+            sensor["anchors"] = {str(i): place for i, place in enumerate(sensor["anchors"].values())}
+    return Config.from_dict(data)
 
 
-def vehicle_of(config: Config, port: int, ttys: dict[str, str], **output: Any) -> Vehicle:
+def serial_sensors(config: Config) -> dict[str, str]:
+    """Sensors that speak on a serial line, and what the vehicle file calls their readings."""
+    kinds = {name: "ranges" if isinstance(s, Uwb) else "wall" for name, s in config.sensor.items()}
+    return {name: kinds[name] for name, s in config.sensor.items() if isinstance(s, Uwb | RangeFinder)}
+
+
+def vehicle_of(config: Config, port: int, ttys: Mapping[str, str], **output: Any) -> Vehicle:
     """What a careful user would write for a streamed flight."""
-    lines = [Nooploop(device=device, **{kind: sensor}) for (kind, sensor), device in _lines(config, ttys)]
+    kinds = serial_sensors(config)
+    lines = [Nooploop(device=device, **{kinds[sensor]: sensor}) for sensor, device in ttys.items()]
     return Vehicle(
         filter=config,
         mavlink=Mavlink(link=f"udpout:127.0.0.1:{port}", profile=output.pop("profile", "ardupilot")),
@@ -68,17 +97,11 @@ def vehicle_of(config: Config, port: int, ttys: dict[str, str], **output: Any) -
     )
 
 
-def _lines(config: Config, ttys: dict[str, str]) -> Iterator[tuple[tuple[str, str], str]]:
-    for sensor, device in ttys.items():
-        yield (("ranges" if sensor.startswith("uwb") else "wall"), sensor), device
-
-
 @dataclass
 class StreamedVehicle:
     """Sends a flight in real time and hears what comes back; times are seconds since :meth:`start`."""
 
-    flight: MadeFlight
-    scene: Scene = SCENE
+    course: Course
     air: Air = Air()
     contract: Contract = field(default_factory=ContractArduPilot)
     boot_ns: int = 90_000_000_000
@@ -86,10 +109,11 @@ class StreamedVehicle:
     silent: Callable[[str, float], bool] = lambda _name, _t: False  # messages that are not sent, by name and time
     boot_at: Callable[[float, int], int] = lambda _t, boot: boot  # tampering with the boot clock
     flags: int = FLAGS_NAVIGATING
+    udp_port: int = 0
 
     def __post_init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
+        self.socket.bind(("127.0.0.1", self.udp_port))
         self.socket.settimeout(0.02)
         self.port = self.socket.getsockname()[1]
         self.rng = np.random.default_rng(self.air.seed)
@@ -100,12 +124,13 @@ class StreamedVehicle:
         self.ttys: dict[str, str] = {}
         self.masters: dict[str, int] = {}
         self.slaves: list[int] = []
-        for name in ("uwb0", "range0"):
-            if name in self.flight.tables:
-                self._plug(name)
+        self.serial = [name for name in serial_sensors(self.course.config) if name in self.course.tables]
+        for name in self.serial:
+            self._plug(name)
         self.peer: tuple[str, int] | None = None
         self.stop = threading.Event()
         self.t0_ns = 0
+        self.events = self._events()
 
     def _plug(self, name: str) -> None:
         master, slave = os.openpty()
@@ -116,7 +141,6 @@ class StreamedVehicle:
 
     def start(self) -> None:
         """Begin as soon as the node is heard: the flight's first instant is then."""
-        self.events = self._events()
         self.socket.settimeout(30.0)
         _, self.peer = self.socket.recvfrom(4096)
         self.socket.settimeout(0.02)
@@ -143,16 +167,19 @@ class StreamedVehicle:
     # what is sent ---------------------------------------------------------------------------------------------------
 
     def _events(self) -> list[tuple[float, int, str, Any]]:
+        makers = {"imu0": self._imu, "flow0": self._flow}
+        for name, kind in serial_sensors(self.course.config).items():
+            makers[name] = self._uwb if kind == "ranges" else self._tof
         events: list[tuple[float, str, Any]] = []
-        for name, make in (("imu0", self._imu), ("flow0", self._flow), ("uwb0", self._uwb), ("range0", self._tof)):
-            if name in self.flight.tables:
-                events += [(t, name, data) for t, data in make(self.flight.tables[name])]
-        events += [(t, "attitude", self._attitude(t)) for t in np.arange(0.0, self.scene.duration_s, 0.05)]
-        events += [(t, "report", self._report) for t in np.arange(0.0, self.scene.duration_s, 0.5)]
-        return [(t, k, name, data) for k, (t, name, data) in enumerate(sorted(events, key=lambda e: e[0]))]
+        for name in makers.keys() & self.course.tables.keys():
+            events += [(t, name, data) for t, data in makers[name](self.course.tables[name])]
+        events += [(t, "attitude", self._attitude(t)) for t in np.arange(0.0, self.course.duration_s, 0.05)]
+        events += [(t, "report", self._report) for t in np.arange(0.0, self.course.duration_s, 0.5)]
+        events.sort(key=lambda e: e[:2])
+        return [(t, k, name, data) for k, (t, name, data) in enumerate(events)]
 
     def _seconds(self, table: Any) -> list[float]:
-        return [float(t) for t in (table.t_ns - self.flight.tables["imu0"].t_ns[0]) * 1e-9]
+        return [float(t) for t in (table.t_ns - self.course.first_ns) * 1e-9]
 
     def _imu(self, table: Any) -> Iterator[tuple[float, Any]]:
         gyro, accel = table.columns["gyro_rad_s"] * FLIP, table.columns["accel_m_s2"] * FLIP
@@ -195,7 +222,7 @@ class StreamedVehicle:
             yield t, body + bytes([sum(body) & 0xFF])
 
     def _attitude(self, t: float) -> Any:
-        at = motion(self.scene, np.array([t]))
+        at = self.course.motion(np.array([t]))
         matrix = np.diag(FLIP) @ at.attitude.as_matrix()[0] @ np.diag(FLIP)
         x, y, z, w = Rotation.from_matrix(matrix).as_quat().tolist()
         return lambda boot: mavlink.MAVLink_attitude_quaternion_message(boot // 1_000_000, w, x, y, z, 0.0, 0.0, 0.0)
@@ -287,18 +314,19 @@ class StreamedVehicle:
 
     # what came back -------------------------------------------------------------------------------------------------
 
-    def axial_errors(self, start_s: float, end_s: float) -> np.ndarray:
-        """Axial velocity of every ODOMETRY minus the truth at its stamp [m/s], between two flight times."""
+    def odometry(self) -> np.ndarray:
+        """Stamp in flight time [s], axial velocity [m/s] and reset counter of every ODOMETRY, shape (n, 3)."""
         rows = []
         for _, m in self.contract.messages:
-            if m.get_type() != "ODOMETRY":
-                continue
-            t = (m.time_usec * 1000 - self.t0_ns) * 1e-9
-            if start_s <= t < end_s:
+            if m.get_type() == "ODOMETRY":
                 w, x, y, z = m.q
-                rows.append((t, *Rotation.from_quat([x, y, z, w]).apply([m.vx, m.vy, m.vz])))
-        table = np.array(rows)
-        return np.asarray(table[:, 1] - motion(self.scene, table[:, 0]).velocity_m_s[:, 0])
+                axial = Rotation.from_quat([x, y, z, w]).apply([m.vx, m.vy, m.vz])[0]
+                rows.append(((m.time_usec * 1000 - self.t0_ns) * 1e-9, axial, m.reset_counter))
+        return np.array(rows).reshape(-1, 3)
+
+    def axial_errors(self, start_s: float, end_s: float) -> np.ndarray:
+        """Axial velocity of every ODOMETRY minus the truth at its stamp [m/s], between two flight times."""
+        return axial_errors(self.course, self.odometry(), start_s, end_s)
 
     def stamps_s(self) -> np.ndarray:
         """Arrival of every ODOMETRY or delta in flight time [s]."""
@@ -320,17 +348,23 @@ def with_output(vehicle: Vehicle, **changes: Any) -> Vehicle:
     return msgspec.structs.replace(vehicle, output=msgspec.structs.replace(vehicle.output, **changes))
 
 
-def clean_axial_errors(flight: MadeFlight, scene: Scene, from_s: float, start_s: float, end_s: float) -> np.ndarray:
+def axial_errors(course: Course, odometry: np.ndarray, start_s: float, end_s: float) -> np.ndarray:
+    """Axial velocity of messages minus the truth at their stamps [m/s], between two flight times."""
+    table = odometry[(odometry[:, 0] >= start_s) & (odometry[:, 0] < end_s)]
+    return np.asarray(table[:, 1] - course.motion(table[:, 0]).velocity_m_s[:, 0])
+
+
+def clean_axial_errors(course: Course, from_s: float, start_s: float, end_s: float) -> np.ndarray:
     """Axial velocity of a replay that starts at ``from_s``, of all readings as they were made, minus the truth."""
-    first = int(flight.tables["imu0"].t_ns[0]) + round(from_s * 1e9)
+    first = course.first_ns + round(from_s * 1e9)
     tables = {}
-    for name, table in flight.tables.items():
+    for name, table in course.tables.items():
         keep = table.t_ns >= first
         tables[name] = Table(table.t_ns[keep], {key: column[keep] for key, column in table.columns.items()})
-    track = run_batch(flight.config, tables).track
-    t = (track.t_ns - flight.tables["imu0"].t_ns[0]) * 1e-9
+    track = run_batch(course.config, tables).track
+    t = (track.t_ns - course.first_ns) * 1e-9
     wanted = (t >= start_s) & (t < end_s)
-    truth = motion(scene, t[wanted]).velocity_m_s[:, 0]
+    truth = course.motion(t[wanted]).velocity_m_s[:, 0]
     return np.asarray(track.velocity_m_s[wanted, 0] - truth)
 
 

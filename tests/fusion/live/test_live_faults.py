@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import subprocess
 import time
 import tty
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +20,10 @@ from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.recording import FlightRecording
 from axialnav.fusion.live.vehicle import Status
 from axialnav.fusion.live.warm_up import warm_up
-from tests.fusion.live.streamed import StreamedVehicle, ahead, streamed_flight, vehicle_of
+from axialnav.replay.flight import load_flight
+from tests.fusion.live.accounts import wait_for
+from tests.fusion.live.sender_process import SenderProcess
+from tests.fusion.live.streamed import StreamedVehicle, ahead, axial_errors, streamed_flight, vehicle_of
 from tests.fusion.live.test_output import VEHICLE
 from tests.fusion.made_flights import Scene
 
@@ -27,13 +34,22 @@ SILENCE_S = 0.25
 class Flown:
     """A streamed flight with a fault: what the node sent and what it said in the end."""
 
-    def __init__(self, scene: Scene, *, meddle: Any = None, tmp_path: Path | None = None, **faults: Any) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        meddle: Any = None,
+        tmp_path: Path | None = None,
+        records: Path | None = None,
+        **faults: Any,
+    ) -> None:
         self.scene = scene
-        self.flight = streamed_flight(scene)
-        self.streamed = StreamedVehicle(self.flight, scene, **faults)
-        vehicle = vehicle_of(ahead(self.flight.config), self.streamed.port, self._links(tmp_path))
+        self.course = streamed_flight(scene)
+        self.streamed = StreamedVehicle(self.course, **faults)
+        vehicle = vehicle_of(ahead(self.course.config), self.streamed.port, self._links(tmp_path))
         warm_up(vehicle.filter, vehicle.estimator)
-        recording = FlightRecording(tmp_path / "flights", True, time.monotonic_ns) if tmp_path else None
+        records = records or (tmp_path / "flights" if tmp_path else None)
+        recording = FlightRecording(records, True, time.monotonic_ns) if records else None
         self.node = Node(vehicle, recording=recording)
         self.speeds: list[float] = []
         self.node.start()
@@ -105,9 +121,10 @@ def test_the_autopilot_reboots() -> None:
     assert np.abs(flown.streamed.axial_errors(6.5, 7.9)).max() < 1.0
 
 
-def test_the_autopilot_s_clock_steps() -> None:
-    """Two seconds forward at 3 s, without a reboot: nothing with a wrong stamp reaches the filter."""
-    flown = Flown(scene(7.0, 13, still_s=5.0), boot_at=lambda t, boot: boot + (2_000_000_000 if t >= 3.0 else 0))
+@pytest.mark.parametrize("step_ns", [2_000_000_000, -2_000_000_000], ids=["forward", "backward"])
+def test_the_autopilot_s_clock_steps(step_ns: int) -> None:
+    """By two seconds at 3 s, without a reboot: nothing with a wrong stamp reaches the filter."""
+    flown = Flown(scene(7.0, 13, still_s=5.0), boot_at=lambda t, boot: boot + (step_ns if t >= 3.0 else 0))
     assert flown.node.failure == ""
     assert flown.silent(3.0 + SILENCE_S, 3.3)
     assert flown.status["autopilot"]["refused"]["stamp far from arrival"] > 20
@@ -148,6 +165,42 @@ def test_uwb_is_unplugged_and_comes_back(tmp_path: Path) -> None:
     assert np.abs(flown.streamed.axial_errors(3.0, 6.4)).max() < 0.5
 
 
+def test_the_sender_is_killed_and_another_comes(tmp_path: Path) -> None:
+    """Autopilot and sensors vanish at once (SIGKILL); a second later others stand at the same place, clocks at zero."""
+    make = partial(streamed_flight, scene(6.0, 15, still_s=6.0))
+    first = SenderProcess(make)
+    links = {sensor: tmp_path / sensor for sensor in first.ttys}
+    for sensor, device in first.ttys.items():
+        links[sensor].symlink_to(device)
+    vehicle = vehicle_of(ahead(make().config), first.port, {sensor: str(link) for sensor, link in links.items()})
+    warm_up(vehicle.filter, vehicle.estimator)
+    node = Node(vehicle)
+    node.start()
+    try:
+        first.wait_for_start()
+        assert wait_for(lambda: node.output.sent > 30, 10.0)
+        first.kill()
+        time.sleep(SILENCE_S)
+        sent = node.output.sent
+        second = SenderProcess(make, udp_port=first.port)
+        assert node.output.sent == sent  # it took longer than a second to begin
+        assert node.status()["filter"]["silent"] == ["flow0", "range0", "uwb0"]
+        for sensor, device in second.ttys.items():
+            links[sensor].unlink()
+            links[sensor].symlink_to(device)
+        second.wait_for_start()
+        assert wait_for(lambda: node.output.sent > sent + 30, 10.0)
+        status = node.status()
+    finally:
+        node.close()
+    told = second.finish()
+    assert node.failure == ""
+    assert told.used > 20
+    assert np.abs(axial_errors(make(), told.odometry, 0.0, 6.0)).max() < 0.5
+    assert told.odometry[0, 2] >= 1  # reset counter: another autopilot, another filter
+    assert {line["connected"] for line in status["nooploop"].values()} == {True}
+
+
 def test_a_recording_that_cannot_begin_is_said_and_the_flight_goes_on(tmp_path: Path) -> None:
     recording = FlightRecording(tmp_path / "disk", True, time.monotonic_ns)
     (tmp_path / "disk").rmdir()
@@ -158,14 +211,69 @@ def test_a_recording_that_cannot_begin_is_said_and_the_flight_goes_on(tmp_path: 
     recording.close()
 
 
+def test_the_disk_is_full_for_a_while(tmp_path: Path, small_disk: Path) -> None:
+    """Somebody fills the disk to the last byte at 3 s and clears it at 4 s: the flight does not notice."""
+    big = small_disk / "somebody's"
+    done: list[dict[str, Any]] = []
+
+    def meddle(flown: Flown) -> None:
+        t = flown.streamed.now_s()
+        if 3.0 < t < 4.0 and not big.exists():
+            with big.open("wb", buffering=0) as file, contextlib.suppress(OSError):
+                while file.write(bytes(1 << 16)):
+                    pass
+        if t > 4.0 and big.exists():
+            done.append(flown.node.status()["recording"])
+            big.unlink()
+
+    flown = Flown(scene(6.0, 16), meddle=meddle, tmp_path=tmp_path, records=small_disk)
+    assert flown.node.failure == ""
+    assert np.diff(flown.sent_s[flown.sent_s > 2.5]).max() < SILENCE_S
+    assert not done[0]["recording"]
+    assert "No space left" in done[0]["problem"] or "are kept" in done[0]["problem"]
+    recording = flown.status["recording"]
+    assert recording["recording"]
+    assert "resumed" in recording["problem"]
+    assert recording["dropped"]["imu0"] > 50
+    (path,) = small_disk.glob("*.mcap")
+    flight = load_flight(path)
+    inside = flight.tables["imu0"].t_ns - flown.streamed.t0_ns
+    assert not ((inside > 3.2e9) & (inside < 3.9e9)).any()
+    assert ((inside > 4.5e9) & (inside < 5.5e9)).sum() > 150
+    taken = sum(flown.status["filter"]["verdicts"]["imu0"].values())
+    assert len(inside) + recording["dropped"]["imu0"] == taken
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 24 MiB in memory."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=24m", "tmpfs", str(place)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"no file system can be mounted here: {mounted.stderr.strip()}")
+    yield place
+    subprocess.run(["umount", "--lazy", str(place)], check=True)
+
+
 def test_a_thread_that_fails_takes_the_node_down() -> None:
     """Half a node must not look alive: systemd starts it again."""
+
+    readable, other = os.pipe()
+    os.write(other, b"!")
 
     class Broken:
         unsent = 0
 
-        def receive(self, timeout_s: float) -> Any:
+        def fileno(self) -> int:
+            return readable
+
+        def receive(self) -> Any:
             raise RuntimeError("the driver has gone")
+
+        def reopen(self) -> None: ...
 
         def send(self, data: bytes) -> bool:
             return False
@@ -175,4 +283,4 @@ def test_a_thread_that_fails_takes_the_node_down() -> None:
         def close(self) -> None: ...
 
     node = Node(msgspec.structs.replace(VEHICLE, status=Status(port=0, line_s=0.0)), link=Broken())
-    assert node.run() == "thread receive: RuntimeError: the driver has gone"
+    assert node.run() == "thread wires: RuntimeError: the driver has gone"

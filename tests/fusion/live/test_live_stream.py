@@ -9,21 +9,24 @@ import socket
 import subprocess
 import sys
 import time
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 
 from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.recording import FlightRecording
 from axialnav.fusion.live.warm_up import warm_up
 from axialnav.fusion.strict_toml import dump
-from axialnav.replay.flight import load_flight
-from axialnav.replay.run import replay
+from tests.fusion.live.accounts import (
+    account_for_every_message,
+    account_for_every_serial_frame,
+    recorded_is_what_was_pushed,
+    the_recording_replays_to_the_last_bit,
+    wait_for,
+)
 from tests.fusion.live.contract import ContractPx4
 from tests.fusion.live.streamed import (
     Air,
@@ -41,7 +44,6 @@ SCENE = Scene(seed=4, duration_s=8.0, still_s=2.5, sensors=("range0", "flow0", "
 BAD = Air(jitter_s=0.002, lost=0.05, reordered=0.05, damaged=0.10, seed=4)
 # what a busy machine does between the two ends is not ours: the stamps below show when messages were made
 LATE = {"ODOMETRY: within 20 ms", "ODOMETRY: late by its own clock"}
-TAIL = 5  # what is lost of the very last packets leaves no gap in the sequence
 SCATTER = 1.4  # one run of five seconds scatters by +-20 %; the bench pools several and stays within 10 %
 
 
@@ -51,19 +53,11 @@ def ask(port: int) -> dict[str, Any]:
     return status
 
 
-def wait_for(condition: Any, seconds: float) -> bool:
-    for _ in range(round(seconds / 0.05)):
-        if condition():
-            return True
-        time.sleep(0.05)
-    return False
-
-
 @pytest.mark.slow
 def test_a_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounted(tmp_path: Path) -> None:
-    flight = streamed_flight(SCENE)
-    streamed = StreamedVehicle(flight, SCENE, BAD)
-    vehicle = vehicle_of(ahead(flight.config), streamed.port, streamed.ttys)
+    course = streamed_flight(SCENE)
+    streamed = StreamedVehicle(course, BAD)
+    vehicle = vehicle_of(ahead(course.config), streamed.port, streamed.ttys)
     warm_up(vehicle.filter, vehicle.estimator)
     recording = FlightRecording(tmp_path / "flights", True, time.monotonic_ns)
     node = Node(vehicle, recording=recording)
@@ -82,80 +76,25 @@ def test_a_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounted(tmp_p
     assert streamed.contract.used("ODOMETRY") > 100
     sent = np.diff([m.time_usec for _, m in streamed.contract.messages if m.get_type() == "ODOMETRY"])
     assert sent.min() >= 20_000
-    clean = rms(clean_axial_errors(flight, SCENE, 0.5, 3.0, 7.8))
+    clean = rms(clean_axial_errors(course, 0.5, 3.0, 7.8))
     assert rms(streamed.axial_errors(3.0, 7.8)) < SCATTER * clean
     (path,) = (tmp_path / "flights").glob("*.mcap")
     recorded_is_what_was_pushed(path, status)
     the_recording_replays_to_the_last_bit(path, node)
 
 
-def account_for_every_message(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
-    """What the vehicle sent is what was accepted plus what the gaps in the sequence say is missing."""
-    over_udp = Counter(streamed.sent)
-    for name in ("uwb0", "range0"):
-        del over_udp[name]
-    accepted, lost = status["link"]["counts"]["accepted"], status["link"]["lost"]["1/1"]
-    spoilt = sum(n for name, n in streamed.dropped.items() if not name.startswith(("uwb0", "range0")))
-    assert accepted + lost <= sum(over_udp.values()) <= accepted + lost + TAIL
-    assert abs(lost - spoilt) <= TAIL
-    messages, pilot = status["autopilot"]["messages"], status["autopilot"]
-    assert sum(messages.values()) == accepted
-    sensors = sum(pilot["readings"].values()) + sum(pilot["refused"].values())
-    silent = sum(messages.get(m, 0) for m in ("TIMESYNC", "HEARTBEAT", "EKF_STATUS_REPORT", "ATTITUDE_QUATERNION"))
-    unknown = messages["ATTITUDE_QUATERNION"] - sum(n for r, n in pilot["refused"].items() if "ATTITUDE" in r)
-    assert unknown >= 0
-    assert sensors + silent - pilot["refused"].get("clock not known yet", 0) <= accepted <= sensors + silent
-    filter_ = status["filter"]
-    pushed = sum(n for sensor in filter_["verdicts"].values() for n in sensor.values())
-    delivered = sum(pilot["readings"].values()) + sum(line["readings"] for line in status["nooploop"].values())
-    assert pushed + filter_["dropped"] + filter_["waiting"] + sum(filter_["refused"].values()) == delivered
-
-
-def account_for_every_serial_frame(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
-    """Frames that arrived whole are decoded; every byte of the others is counted."""
-    for name, size in (("uwb0", 29), ("range0", 16)):
-        line = status["nooploop"][streamed.ttys[name]]
-        spoilt = streamed.dropped[name] + streamed.dropped[f"{name} damaged"]
-        decoded = sum(line["frames"].values())
-        assert decoded == streamed.sent[name] - spoilt
-        assert line["total_bytes"] == decoded * size + line["skipped_bytes"] + line["waiting_bytes"]
-
-
-def recorded_is_what_was_pushed(path: Path, status: dict[str, Any]) -> None:
-    with path.open("rb") as file:
-        statistics = make_reader(file).get_summary()
-    assert statistics is not None
-    assert statistics.statistics is not None
-    counts = statistics.statistics.channel_message_counts
-    topics = {channel.topic: counts[number] for number, channel in statistics.channels.items()}
-    for sensor, verdicts in status["filter"]["verdicts"].items():
-        assert topics[f"/{sensor}"] == sum(verdicts.values())
-    assert topics["/wire/mavlink_in"] > 1000
-    assert topics["/state"] > 100
-
-
-def the_recording_replays_to_the_last_bit(path: Path, node: Node) -> None:
-    """Late, damaged and lost as it was, what was flown is what the replay of its recording gives."""
-    snapshot = node.core.snapshot(0)
-    assert snapshot is not None
-    track = replay(load_flight(path)).track
-    assert track.t_ns[-1] == snapshot.state.t_ns
-    assert track.velocity_m_s[-1].tobytes() == snapshot.state.velocity_m_s.tobytes()
-    assert track.position_m[-1].tobytes() == snapshot.state.position_m.tobytes()
-
-
 @pytest.mark.slow
 def test_px4_takes_the_axial_estimate() -> None:
     """The axial estimator (attitude of the autopilot, no UWB) with the profile for PX4."""
     scene = Scene(seed=6, duration_s=4.0, still_s=1.5, sensors=("range0", "flow0", "uwb0"), uwb_rate_hz=50.0)
-    flight = streamed_flight(scene)
-    config = ahead(flight.config).to_dict()
+    course = streamed_flight(scene)
+    config = ahead(course.config).to_dict()
     config["sensor"]["att0"] = {"kind": "attitude"}
     config["axial"]["heading_rad"] = 0.0
     del config["sensor"]["uwb0"]
-    streamed = StreamedVehicle(flight, scene, contract=ContractPx4())
+    streamed = StreamedVehicle(course, contract=ContractPx4())
     ttys = {"range0": streamed.ttys["range0"]}
-    vehicle = vehicle_of(type(flight.config).from_dict(config), streamed.port, ttys, profile="px4")
+    vehicle = vehicle_of(type(course.config).from_dict(config), streamed.port, ttys, profile="px4")
     inputs = msgspec.structs.replace(vehicle.input, attitude="att0")
     vehicle = msgspec.structs.replace(vehicle, estimator="axial", input=inputs)
     warm_up(vehicle.filter, vehicle.estimator)
@@ -179,11 +118,11 @@ def test_the_verb_runs_with_the_core_alone_and_ends_cleanly_on_sigterm(tmp_path:
     """Every library of the extras is made unimportable; the process answers on its status port and stops when told."""
     for library in ("cyclopts", "rich", "plotly", "jinja2", "pyarrow", "matplotlib"):
         (tmp_path / f"{library}.py").write_text(f"raise ModuleNotFoundError('no {library}', name='{library}')\n")
-    flight = streamed_flight(SCENE)
-    streamed = StreamedVehicle(flight, SCENE)
+    course = streamed_flight(SCENE)
+    streamed = StreamedVehicle(course)
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    vehicle = vehicle_of(ahead(flight.config), streamed.port, streamed.ttys)
+    vehicle = vehicle_of(ahead(course.config), streamed.port, streamed.ttys)
     data = msgspec.to_builtins(vehicle)
     data["status"] = {"port": port, "line_s": 0.5}
     path = tmp_path / "vehicle.toml"

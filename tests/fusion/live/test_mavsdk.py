@@ -75,7 +75,7 @@ def decoder() -> Any:
 
 
 def snapshot(t_ns: int = 5_000_000_000) -> Snapshot:
-    return Snapshot(state(t_ns), np.array([0.1, 0.2, 0.3]), t_ns, t_ns, 0)
+    return Snapshot(state(t_ns), np.array([0.1, 0.2, 0.3]), t_ns, t_ns, t_ns, 0)
 
 
 @pytest.mark.parametrize(("content", "quality", "counter"), [("full", 80, 7), ("velocity", 1, 0), ("axial", 100, 255)])

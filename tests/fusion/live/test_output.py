@@ -56,6 +56,7 @@ class Bench:
     changes: dict[str, Any] = field(default_factory=dict)
     imu_age_ns: int = 3 * MS
     aid_age_ns: int = 10 * MS
+    axial_age_ns: int = 0
     restarts: int = 0
     sent: list[tuple[int, Any]] = field(default_factory=list)
     hold_imu_ns: int | None = None
@@ -67,7 +68,8 @@ class Bench:
 
     def snapshot(self, now_ns: int) -> Snapshot | None:
         imu_ns = self.hold_imu_ns or now_ns - self.imu_age_ns
-        return Snapshot(state(now_ns, **self.changes), np.zeros(3), imu_ns, now_ns - self.aid_age_ns, self.restarts)
+        aid_ns, axial_ns = now_ns - self.aid_age_ns, now_ns - max(self.aid_age_ns, self.axial_age_ns)
+        return Snapshot(state(now_ns, **self.changes), np.zeros(3), imu_ns, aid_ns, axial_ns, self.restarts)
 
     def send(self, message: Any) -> bool:
         self.sent.append((self.now_ns, message))
@@ -163,6 +165,16 @@ def test_the_reset_counter_wraps() -> None:
         bench.step()
     assert bench.output.reset_counter == 299 % 256
     assert all(0 <= m.reset_counter <= 255 for _, m in bench.sent)
+
+
+def test_quality_is_the_lowest_while_nothing_that_sees_the_corridor_is_fused() -> None:
+    """A range finder alone keeps messages going, but nobody measures the velocity: to be seen in every message."""
+    bench = Bench(axial_age_ns=150 * MS)
+    assert bench.step().quality > 50
+    bench.axial_age_ns = 210 * MS
+    assert bench.step().quality == 1
+    bench.axial_age_ns = 20 * MS
+    assert bench.step().quality > 50
 
 
 def test_quality_says_how_good_the_velocity_is_and_is_never_zero() -> None:

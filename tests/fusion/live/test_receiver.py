@@ -12,6 +12,7 @@ from axialnav.fusion.errors import ConfigError
 from axialnav.fusion.live.receiver import BURST, MAX_PARSED, Receiver
 from axialnav.fusion.live.security import TICKS_PER_S, Signatures, read_key, signing_ticks
 from axialnav.fusion.live.sender import Sender
+from tests.fusion.live.hostile import feed_mavlink
 
 S = 1_000_000_000
 KEY, OTHER = bytes(range(32)), bytes(32)
@@ -152,6 +153,15 @@ def test_random_bytes_do_no_harm() -> None:
         assert len(heard._parser.buf) < 2 * MAX_PARSED
     heard.feed(bytes(600), 0)
     assert [m.get_type() for m in heard.feed(packet(packer), 0)] == ["ATTITUDE_QUATERNION"]
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
+def test_a_million_random_and_mutated_bytes_do_no_harm(key: bytes | None) -> None:
+    """Neither to the parser nor to what takes its messages: contents are arbitrary behind right checksums."""
+    survived = feed_mavlink(key, 1_000_000, seed=3)
+    assert survived.taken == 1_000_000
+    assert (survived.came_out > 1000) == (key is None)
+    assert survived.most_waiting < 4 * MAX_PARSED
 
 
 class Wire:

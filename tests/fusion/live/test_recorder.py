@@ -13,19 +13,22 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import FlightError
 from axialnav.fusion.live.recorder import messages as m
 from axialnav.fusion.live.recorder.definition import Field, parse_definition
-from axialnav.fusion.live.recorder.recorder import Limits, Recorder
+from axialnav.fusion.live.recorder.limits import Limits
+from axialnav.fusion.live.recorder.recorder import Recorder
 from axialnav.fusion.live.recorder.sink import McapSink
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict
 from axialnav.fusion.readings import (
@@ -128,6 +131,24 @@ def test_an_independent_decoder_reads_every_kind_of_message(tmp_path: Path) -> N
     assert odometry.twist.twist.linear.y == pytest.approx(-1.5)  # turned left by 90 degrees, flying to its right
     assert odometry.twist.covariance[7] == pytest.approx(4.0)
     assert odometry.pose.covariance[21] == 7.0
+
+
+def test_a_second_reader_gets_every_message_of_a_bare_file(tmp_path: Path) -> None:
+    """rosbags: other code for MCAP, for the definitions and for the bytes than the one above."""
+    with Recorder(tmp_path / "flight.mcap", config=Config()) as recorder:
+        for reading in READINGS:
+            recorder.write(reading.sensor, reading.t_ns + 1000, reading)
+        recorder.write("state", 20, state(20))
+    with AnyReader([tmp_path / "flight.mcap"]) as reader:
+        found = {c.topic: (t, reader.deserialize(raw, c.msgtype)) for c, t, raw in reader.messages()}
+    assert {f"/{reading.sensor}" for reading in READINGS} <= set(found)
+    arrival_ns, range_ = found["/tof0"]
+    assert (arrival_ns, range_.header.stamp.nanosec, range_.range_m) == (1009, 9, 0.1 + 0.2)
+    assert found["/imu0"][1].linear_acceleration.x == 1 / 3
+    assert found["/uwb1"][1].anchor_b == "12"
+    assert found["/state"][1].twist.twist.linear.y == pytest.approx(-1.5)
+    picture = cv2.imdecode(np.frombuffer(found["/cam0"][1].data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(picture, PICTURE)
 
 
 @pytest.mark.parametrize("name", m.STANDARD)

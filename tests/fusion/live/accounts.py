@@ -1,0 +1,85 @@
+"""Book-keeping of a streamed flight: what was sent is what was taken plus what is counted as lost."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mcap.reader import make_reader
+
+from axialnav.fusion.live.node import Node
+from axialnav.replay.flight import load_flight
+from axialnav.replay.run import replay
+from tests.fusion.live.streamed import StreamedVehicle, serial_sensors
+
+TAIL = 5  # what is lost of the very last packets leaves no gap in the sequence
+FRAME_BYTES = {"ranges": 29, "wall": 16}
+
+
+def wait_for(condition: Callable[[], bool], seconds: float) -> bool:
+    for _ in range(round(seconds / 0.05)):
+        if condition():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def account_for_every_message(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
+    """What the vehicle sent is what was accepted plus what the gaps in the sequence say is missing."""
+    over_udp = Counter(streamed.sent)
+    for name in streamed.serial:
+        del over_udp[name]
+    accepted, lost = status["link"]["counts"]["accepted"], status["link"]["lost"]["1/1"]
+    spoilt = sum(n for name, n in streamed.dropped.items() if not name.startswith(tuple(streamed.serial)))
+    assert accepted + lost <= sum(over_udp.values()) <= accepted + lost + TAIL
+    assert abs(lost - spoilt) <= TAIL
+    messages, pilot = status["autopilot"]["messages"], status["autopilot"]
+    assert sum(messages.values()) == accepted
+    sensors = sum(pilot["readings"].values()) + sum(pilot["refused"].values())
+    silent = sum(messages.get(m, 0) for m in ("TIMESYNC", "HEARTBEAT", "EKF_STATUS_REPORT", "ATTITUDE_QUATERNION"))
+    unknown = messages["ATTITUDE_QUATERNION"] - sum(n for r, n in pilot["refused"].items() if "ATTITUDE" in r)
+    assert unknown >= 0
+    assert sensors + silent - pilot["refused"].get("clock not known yet", 0) <= accepted <= sensors + silent
+    filter_ = status["filter"]
+    pushed = sum(n for sensor in filter_["verdicts"].values() for n in sensor.values())
+    delivered = sum(pilot["readings"].values()) + sum(line["readings"] for line in status["nooploop"].values())
+    delivered += status["camera"]["measured"] if status["camera"] else 0
+    assert pushed + filter_["dropped"] + filter_["waiting"] + sum(filter_["refused"].values()) == delivered
+
+
+def account_for_every_serial_frame(streamed: StreamedVehicle, status: dict[str, Any]) -> None:
+    """Frames that arrived whole are decoded; every byte of the others is counted."""
+    kinds = serial_sensors(streamed.course.config)
+    for name in streamed.serial:
+        size = FRAME_BYTES[kinds[name]]
+        line = status["nooploop"][streamed.ttys[name]]
+        spoilt = streamed.dropped[name] + streamed.dropped[f"{name} damaged"]
+        decoded = sum(line["frames"].values())
+        assert decoded == streamed.sent[name] - spoilt
+        assert line["total_bytes"] == decoded * size + line["skipped_bytes"] + line["waiting_bytes"]
+
+
+def recorded_is_what_was_pushed(path: Path, status: dict[str, Any]) -> None:
+    with path.open("rb") as file:
+        statistics = make_reader(file).get_summary()
+    assert statistics is not None
+    assert statistics.statistics is not None
+    counts = statistics.statistics.channel_message_counts
+    topics = {channel.topic: counts[number] for number, channel in statistics.channels.items()}
+    for sensor, verdicts in status["filter"]["verdicts"].items():
+        assert topics[f"/{sensor}"] == sum(verdicts.values())
+    assert topics["/wire/mavlink_in"] > 1000
+    assert topics["/state"] > 100
+
+
+def the_recording_replays_to_the_last_bit(path: Path, node: Node) -> None:
+    """Late, damaged and lost as it was, what was flown is what the replay of its recording gives."""
+    snapshot = node.core.snapshot(0)
+    assert snapshot is not None
+    track = replay(load_flight(path)).track
+    assert track.t_ns[-1] == snapshot.state.t_ns
+    assert track.velocity_m_s[-1].tobytes() == snapshot.state.velocity_m_s.tobytes()
+    assert track.position_m[-1].tobytes() == snapshot.state.position_m.tobytes()

@@ -1,0 +1,149 @@
+"""A corridor flight with its pictures through the whole node, in real time over a bad link."""
+
+from __future__ import annotations
+
+import gc
+import time
+from itertools import islice
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from numba.core.registry import CPUDispatcher
+
+from axialnav.fusion.camera_feed import CameraFeed
+from axialnav.fusion.config import Config
+from axialnav.fusion.live.node import Node
+from axialnav.fusion.live.recording import FlightRecording
+from axialnav.fusion.live.vehicle import CameraInput, Vehicle
+from axialnav.fusion.live.warm_up import wall_pictures, warm_up
+from axialnav.fusion.readings import CameraFrame
+from axialnav.models.rig import Camera, Imu, Surface
+from axialnav.replay.flight import load_flight
+from axialnav.replay.frames import camera_frames
+from tests.fusion.live.accounts import (
+    account_for_every_message,
+    account_for_every_serial_frame,
+    recorded_is_what_was_pushed,
+    the_recording_replays_to_the_last_bit,
+    wait_for,
+)
+from tests.fusion.live.contract import ContractPx4
+from tests.fusion.live.filmed import Shutter, clean_errors, filmed_course, fused_errors, heard, render
+from tests.fusion.live.streamed import Air, StreamedVehicle, rms, vehicle_of
+
+SECONDS, STILL_S = 10.0, 2.0
+BAD = Air(jitter_s=0.002, lost=0.05, reordered=0.05, damaged=0.10, seed=5)
+SILENCE_S = 0.25
+WINDOW_S = 0.07  # motion belongs to the middle of five pictures and is fused after the last of them
+SCATTER = 1.6  # of one run of eight seconds on a busy machine; the bench pools several
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return render(
+        tmp_path_factory.mktemp("filmed") / "straight", seed=3, duration_s=SECONDS, width_px=320, height_px=240
+    )
+
+
+def with_camera(vehicle: Vehicle) -> Vehicle:
+    return msgspec.structs.replace(vehicle, camera=CameraInput(source="folder", sensor="cam0"))
+
+
+def test_a_filmed_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounted(folder: Path, tmp_path: Path) -> None:
+    course = filmed_course(folder)
+    streamed, shutter = StreamedVehicle(course, BAD), Shutter(folder, course.config)
+    vehicle = with_camera(vehicle_of(course.config, streamed.port, streamed.ttys))
+    warm_up(vehicle.filter, vehicle.estimator)
+    node = Node(vehicle, source=shutter, recording=FlightRecording(tmp_path, True, time.monotonic_ns))
+    node.start()
+    streamed.start()
+    shutter.release(streamed.t0_ns)
+    try:
+        assert wait_for(lambda: streamed.now_s() > SECONDS + 0.3, 60.0)
+        status = node.status()
+    finally:
+        node.close()
+        streamed.close()
+    assert node.failure == ""
+    account_for_every_message(streamed, status)
+    account_for_every_serial_frame(streamed, status)
+    camera = status["camera"]
+    assert camera["pictures"] == camera["measured"] + camera["refused"] + camera["unusable"] + camera["overwritten"]
+    assert sum(status["filter"]["verdicts"]["cam0"].values()) == camera["measured"] > 100
+    assert np.abs(streamed.axial_errors(STILL_S, SECONDS - 0.2)).max() < 0.2
+    (path,) = tmp_path.glob("*.mcap")
+    recorded_is_what_was_pushed(path, status)
+    the_recording_replays_to_the_last_bit(path, node)
+    from_s = (status["filter"]["began_ns"] - streamed.t0_ns) * 1e-9 - 1e-3
+    clean = rms(clean_errors(folder, from_s, STILL_S, SECONDS - 0.2))
+    fused = rms(fused_errors(path, course, streamed.t0_ns, STILL_S, SECONDS - 0.2))
+    assert fused < SCATTER * clean
+
+
+def test_the_camera_freezes_for_a_while(folder: Path) -> None:
+    """From 4 s to 5.5 s the driver gives the same pixels with fresh stamps; nothing else sees the axis."""
+    course = filmed_course(folder)
+    config = msgspec.structs.replace(course.config, disabled=("uwb0",))
+    streamed = StreamedVehicle(course, contract=ContractPx4())
+    shutter = Shutter(folder, config, frozen_s=(4.0, 5.5))
+    ttys = {sensor: device for sensor, device in streamed.ttys.items() if sensor != "uwb0"}
+    vehicle = with_camera(vehicle_of(config, streamed.port, ttys, profile="px4"))
+    warm_up(vehicle.filter, vehicle.estimator)
+    node, said = Node(vehicle, source=shutter), []
+    node.start()
+    streamed.start()
+    shutter.release(streamed.t0_ns)
+    try:
+        while streamed.now_s() < 9.0:
+            time.sleep(0.02)
+            said.append((streamed.now_s(), "cam0" in node.core.silent(time.monotonic_ns())))
+    finally:
+        node.close()
+        streamed.close()
+    assert node.failure == ""
+    sent = [m for _, m in streamed.contract.messages if m.get_type() == "ODOMETRY"]
+    t = np.array([(m.time_usec * 1000 - streamed.t0_ns) * 1e-9 for m in sent])
+    quality = np.array([m.quality for m in sent])
+    frozen = (t > 4.0 + SILENCE_S + WINDOW_S) & (t < 5.5)
+    assert frozen.sum() > 15
+    assert set(quality[frozen]) == {1}
+    assert np.median(quality[(t > 3.0) & (t < 4.0)]) > 20
+    assert np.median(quality[t > 6.5]) > 20
+    silent = [t for t, quiet in said if quiet and t > 3.0]
+    assert silent[0] < 4.0 + SILENCE_S + WINDOW_S + 0.1
+    assert np.abs(streamed.axial_errors(3.0, 8.9)).max() < 0.5
+
+
+def test_after_the_warm_up_no_picture_waits_for_a_compiler(folder: Path) -> None:
+    """A flight's pictures run nothing that the made-up wall of the warm-up has not run before."""
+    config = heard(load_flight(folder).config)
+    warm_up(config, "corridor")
+    before = compiled()
+    feed = CameraFeed(config)
+    measured = sum(feed.push(frame) is not None for frame in islice(camera_frames(load_flight(folder), "cam0"), 120))
+    assert measured > 80
+    assert {name: count for name, count in compiled().items() if count != before.get(name, 0)} == {}
+
+
+def compiled() -> dict[str, int]:
+    """How many versions of each kernel of the estimators are loaded."""
+    kernels = [kernel for kernel in gc.get_objects() if isinstance(kernel, CPUDispatcher)]
+    names = {f"{k.py_func.__module__}.{k.py_func.__name__}": len(k.signatures) for k in kernels}
+    return {name: count for name, count in names.items() if name.startswith("axialnav.estimators")}
+
+
+def test_the_warm_up_measures_its_wall() -> None:
+    for resolution in ((160, 120), (640, 480)):
+        camera = Camera(resolution=resolution, intrinsics=(300.0, 300.0, 80.0, 60.0), rate_hz=30.0, surface="wall")
+        config = Config(surface={"wall": Surface(normal=(0.0, -1.0, 0.0))}, sensor={"imu0": Imu(), "cam0": camera})
+        feed = CameraFeed(config)
+        motions = [
+            feed.push(CameraFrame(t_ns=k * 33_333_333, sensor="cam0", image=image))
+            for k, image in enumerate(wall_pictures(resolution, 6))
+        ]
+        assert motions[-1] is not None
+        assert motions[-1].dx_px == pytest.approx(-3.0, abs=0.05)
