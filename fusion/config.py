@@ -143,7 +143,7 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     bias_time_s: Positive = 0.6
     bias_length_m: Positive = 0.4
     correlation_time_s: NonNegative = 0.014
-    nlos_db: float = 2.0
+    nlos_db: float = 6.0
     nlos_scale_db: Positive = 2.5
     gate: Gate = Gate(soft_sigma=2.2)
 

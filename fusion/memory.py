@@ -67,6 +67,7 @@ MEMORY: Final = np.dtype(
         ("t_block", "i8"),
         ("ring_j", "f8", (BLOCKS, 3)),
         ("ring_k", "f8", (BLOCKS, 3)),
+        ("torn", "i8"),  # blocks in a row in which the filter's velocity contradicts the shadow's
         ("t_motion_blamed", "i8"),  # inertia sided with UWB against pixel motion
         ("t_neither", "i8"),  # inertia contradicted pixel motion while UWB did
     ],
@@ -104,6 +105,7 @@ SOURCE_MEMORY: Final = np.dtype(
         ("ring", "f4", (MAX_ANCHORS, BLOCKS)),
         ("t_heard", "i8", MAX_ANCHORS),
         ("value", "f8", MAX_ANCHORS),
+        ("power", "f8", MAX_ANCHORS),  # received power and that of the first path, added [dBm]
         ("expected", "f4", MAX_ANCHORS),
         ("outside", "i4", MAX_ANCHORS),  # jumps in a row
         ("repeats", "i4", MAX_ANCHORS),
@@ -123,7 +125,7 @@ SCRATCH: Final = np.dtype(
         ("last", "f8", 6), ("look", "f8", 3),
         ("q", "f8", 3), ("fix", "f8", 3), ("move", "f8", 3), ("rhs", "f8", 3), ("prior", "f8", 3), ("common", "f8"),
         ("column", "f8", COLUMNS), ("column_H", "f8", (COLUMNS, N_ERROR)), ("weight", "f8", COLUMNS),
-        ("would", "f8"), ("refused", "i8"), ("v_before", "f8", 3),
+        ("would", "f8"), ("refused", "i8"), ("v_before", "f8", 3), ("ways", "f8", (2, MAX_ANCHORS)),
     ],
     align=True,
 )  # fmt: skip
@@ -155,7 +157,7 @@ def new_memory(n_sources: int) -> Memory:
     sources = np.zeros(n_sources, SOURCE_MEMORY)
     for stamp in ("t_seen", "t_fused", "t_trusted", "t_first", "t_fit", "t_since", "t_disagree", "t_moved", "t_heard"):
         sources[stamp] = LONG_AGO
-    for unknown in ("gap_s", "datum_m", "value", "place", "ring"):
+    for unknown in ("gap_s", "datum_m", "value", "power", "place", "ring"):
         sources[unknown] = np.nan
     sources["trust"], sources["scatter"] = 1.0, SCATTER_START_M
     core = np.zeros(1, MEMORY)

@@ -46,6 +46,7 @@ class Reason(IntEnum):
     NOT_FINITE = 14
     JUMP = 15
     STUCK = 16
+    COPY = 17
 
 
 REASONS: dict[Reason, str] = {
@@ -65,6 +66,7 @@ REASONS: dict[Reason, str] = {
     Reason.NOT_FINITE: "the value, or what the filter expects of it, is not a finite number",
     Reason.JUMP: "the value jumps away from what its anchor has been saying",
     Reason.STUCK: "the value stands still while the vehicle moves",
+    Reason.COPY: "the receiver sent its last reading of this anchor once more",
     Reason.NO_MOTION: "the frames so far give no displacement that can be believed",
 }
 
@@ -203,6 +205,11 @@ class InnovationLog:
     weight: Array
 
 
+BLIND = frozenset(
+    {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT, Reason.ALIGNING, Reason.NO_MOTION, Reason.COPY}
+)
+
+
 def verdict_of(reason: Reason) -> Verdict:
     """Verdict that goes with a reason."""
     if reason is Reason.NONE:
@@ -211,7 +218,7 @@ def verdict_of(reason: Reason) -> Verdict:
         return Verdict.GATED
     if reason is Reason.TOO_OLD:
         return Verdict.LATE
-    if reason in {Reason.NO_GEOMETRY, Reason.SIGN_UNCERTAIN, Reason.TOO_SHORT, Reason.ALIGNING, Reason.NO_MOTION}:
+    if reason in BLIND:
         return Verdict.BLIND
     if reason is Reason.SUPERVISOR:
         return Verdict.SUSPECT

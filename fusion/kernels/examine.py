@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.kernels.measure import BLUR, FLOW, RANGE
 from axialnav.fusion.kernels.reanchor import TRUST_TIME_S, note_trust
 from axialnav.fusion.kernels.shadow import aid_shadow
-from axialnav.fusion.kernels.tracker import STUCK, SUPERVISOR, follow
+from axialnav.fusion.kernels.tracker import COPY, STUCK, SUPERVISOR, follow
 from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import LOG_CODE, LOG_WEIGHT
 from axialnav.models.jit import Record
@@ -31,7 +31,7 @@ def examine(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
         x = m.x[0]
         matrix_from_quaternion(x[QUAT], x[QUAT + 1], x[QUAT + 2], x[QUAT + 3], w.R)
         reason = follow(t_ns, s, seen, values, m, w, c)
-        return SUPERVISOR if suspect else reason
+        return SUPERVISOR if suspect and reason != COPY else reason
     if RANGE <= s.kind <= BLUR:
         value = values[0] if s.kind == RANGE else values[1]
         same = value == seen.value[0]
@@ -55,7 +55,10 @@ def learn(t_ns: int, gap_s: float, s: Record, seen: Record, m: Record, w: Record
     if axes <= 0:
         return
     if is_uwb(s.kind):
-        note_trust(t_ns, gap_s, TRUST_TIME_S, w.row[LOG_WEIGHT], seen)
+        if seen.held == 1:
+            note_trust(t_ns, gap_s, TRUST_TIME_S, w.would, seen)
+        elif w.refused not in (SUPERVISOR, COPY):  # an anchor that is excluded says nothing about the others
+            note_trust(t_ns, gap_s, TRUST_TIME_S, w.row[LOG_WEIGHT], seen)
     elif RANGE <= s.kind <= BLUR:
         seen.latest = w.h[0]
         seen.latest_sigma = math.sqrt(w.variance[0])

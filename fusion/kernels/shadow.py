@@ -53,15 +53,11 @@ def step_shadow(dt: float, v_before: Array, m: Record) -> None:
 def draw_shadow(m: Record, w: Record, c: Record) -> None:
     """Once a block: take the filter's velocity as a weak reading, axis by axis, and learn how good inertia now is.
 
-    The acceleration is as wrong as gravity through the tilt's error and the accelerometer's bias make it.
+    The acceleration is as wrong as gravity through the tilt's error and the accelerometer's bias make it, together:
+    the filter knows their sum far better than either.
     """
-    V, P = m.shadow_V, m.P[0]
-    m.shadow_q = c.shadow_m_s2 * c.shadow_m_s2
-    tilt, bias = 0.0, 0.0
-    for i in range(3):
-        tilt = max(tilt, P[E_ATT + i, E_ATT + i] if i < 2 else 0.0)
-        bias = max(bias, P[E_ACCEL_BIAS + i, E_ACCEL_BIAS + i])
-    m.shadow_q += c.gravity_m_s2 * c.gravity_m_s2 * tilt + bias
+    V = m.shadow_V
+    m.shadow_q = c.shadow_m_s2 * c.shadow_m_s2 + _acceleration_variance(m, w)
     if m.imu_fault == 1:
         m.shadow_q += FAULTY_M_S2 * FAULTY_M_S2
     for axis in range(3):
@@ -73,6 +69,25 @@ def draw_shadow(m: Record, w: Record, c: Record) -> None:
             m.shadow_v[i] += w.ray[i] / S * y
             for j in range(3):
                 V[i, j] -= w.ray[i] * w.ray[j] / S
+
+
+@kernel
+def _acceleration_variance(m: Record, w: Record) -> float:
+    """Variance of the acceleration that inertia tells, in its worst direction [m^2/s^4]; ``w.R`` is the attitude."""
+    P, worst = m.P[0], 0.0
+    for i in range(3):
+        for k in range(3):
+            after, last = (k + 1) % 3, (k + 2) % 3
+            w.ray[k] = w.R[i, last] * m.imu[3 + after] - w.R[i, after] * m.imu[3 + last]  # of the attitude error
+            w.ray[3 + k] = -w.R[i, k]  # of the accelerometer's bias
+        variance = 0.0
+        for j in range(6):
+            for k in range(6):
+                row = E_ATT + j if j < 3 else E_ACCEL_BIAS + j - 3
+                column = E_ATT + k if k < 3 else E_ACCEL_BIAS + k - 3
+                variance += w.ray[j] * P[row, column] * w.ray[k]
+        worst = max(worst, variance)
+    return float(worst)
 
 
 @kernel

@@ -4,6 +4,8 @@ Every quarter of a second the place that each UWB source claims, relative to the
 median over three blocks, against that of one and of three seconds before, is the source's way beside the shadow's: more
 than their uncertainties allow makes it SUSPECT.  It is believed again once both agree and the place fits the filter; if
 they agree but the place does not fit for long, the filter's position is moved there (REACQUIRE).  Silence is LOST.
+SUSPECT are also a source that is hardly believed reading by reading while pixel motion aids, and one that pulls the
+filter's velocity away from the shadow's.
 """
 
 from __future__ import annotations
@@ -13,15 +15,16 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.fusion.kernels.locate import ENOUGH_AGREE, HEARD_S, NARROWEST_M, common_length, locate
-from axialnav.fusion.kernels.measure import BLUR, FLOW, UWB_POSITION, UWB_TDOA
+from axialnav.fusion.kernels.anchors import CALM, judge_anchors
+from axialnav.fusion.kernels.kinematics import directions, is_torn, kinematics
+from axialnav.fusion.kernels.locate import ENOUGH_AGREE, locate
+from axialnav.fusion.kernels.measure import BLUR, FLOW, UWB_POSITION
 from axialnav.fusion.kernels.reanchor import FLOW_FRESH_S, move_position
-from axialnav.fusion.kernels.shadow import displacement_variance, draw_shadow, recover_velocity, third_witness
-from axialnav.fusion.kernels.tracker import path_length
+from axialnav.fusion.kernels.shadow import draw_shadow, recover_velocity
 from axialnav.fusion.kernels.update import is_uwb
-from axialnav.fusion.memory import BLOCK_S, BLOCKS
+from axialnav.fusion.memory import BLOCKS
 from axialnav.fusion.supervisor import SourceState
-from axialnav.models.jit import Integer, Record, Records
+from axialnav.models.jit import Record, Records
 from axialnav.models.rotations import matrix_from_quaternion
 from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_POS, POS, QUAT
@@ -30,14 +33,13 @@ Array = NDArray[np.float64]
 OFF, ALIGNING, OK = int(SourceState.OFF), int(SourceState.ALIGNING), int(SourceState.OK)
 SUSPECT, REACQUIRE, LOST = int(SourceState.SUSPECT), int(SourceState.REACQUIRE), int(SourceState.LOST)
 ALIGN_S = 1.0
-WINDOWS = (4, 12)  # blocks: 1 s and 3 s
-CALM = 0.8  # share of a limit below which ways agree again
+TORN_BLOCKS = 2
 REFUSED_TRUST, GOOD_TRUST = 0.15, 0.5
+LOW_TRUST, FAIR_TRUST = 0.25, 0.4
 SIGMAS = 2.0
 FUSED_S = 1.0
 NOT_TRUSTED_S = 0.3
 UNFIT_S = 3.0  # a place that does not fit for so long is doubted even if single readings pass
-LEAST_LEVEL = 0.1  # a steeper axis than this has no horizontal of its own
 
 
 @kernel
@@ -52,6 +54,8 @@ def close_block(t_ns: int, sources: Records, memory: Records, m: Record, w: Reco
         m.ring_j[at, i] = m.flow_j[i]
         m.ring_k[at, i] = m.flow_k[i]
     draw_shadow(m, w, c)
+    aided = (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S and m.imu_fault == 0
+    m.torn = m.torn + 1 if aided and is_torn(t_ns, m, w, c) else 0
     uwb_ok = False
     for i in range(sources.shape[0]):
         s, seen = sources[i], memory[i]
@@ -68,7 +72,7 @@ def close_block(t_ns: int, sources: Records, memory: Records, m: Record, w: Reco
             seen.state = OK
         if is_uwb(s.kind):
             alone = not _another_aids(i, t_ns, sources, memory)
-            _judge_uwb(t_ns, alone, s, seen, m, w, c)
+            _judge_uwb(t_ns, aided, alone, s, seen, m, w, c)
             uwb_ok = uwb_ok or (seen.state == OK and (t_ns - seen.t_fused) * 1e-9 < FUSED_S)
     for i in range(sources.shape[0]):
         seen = memory[i]
@@ -90,76 +94,6 @@ def _another_aids(which: int, t_ns: int, sources: Records, memory: Records) -> b
 
 
 @kernel
-def median3(a: float, b: float, c: float) -> float:
-    """Median of three; NaN where one is."""
-    if not (np.isfinite(a) and np.isfinite(b) and np.isfinite(c)):
-        return np.nan
-    return max(min(a, b), min(max(a, b), c))
-
-
-@kernel
-def way(column: Array, now: Integer, window: Integer) -> float:
-    """Change of a ring's median over three blocks against that ``window`` blocks before; NaN without data."""
-    a = median3(column[now % BLOCKS], column[(now - 1) % BLOCKS], column[(now - 2) % BLOCKS])
-    then = now - window
-    return a - median3(column[then % BLOCKS], column[(then - 1) % BLOCKS], column[(then - 2) % BLOCKS])
-
-
-@kernel
-def directions(c: Record, U: Array) -> None:
-    """Write the corridor's axis, a horizontal across it and the third direction into the rows of ``U`` (3, 3)."""
-    level = math.hypot(c.axial_x, c.axial_y)
-    U[0, 0], U[0, 1], U[0, 2] = c.axial_x, c.axial_y, c.axial_z
-    U[1, 0], U[1, 1], U[1, 2] = 1.0, 0.0, 0.0
-    if level > LEAST_LEVEL:
-        U[1, 0], U[1, 1] = -c.axial_y / level, c.axial_x / level
-    U[2, 0] = U[0, 1] * U[1, 2] - U[0, 2] * U[1, 1]
-    U[2, 1] = U[0, 2] * U[1, 0] - U[0, 0] * U[1, 2]
-    U[2, 2] = U[0, 0] * U[1, 1] - U[0, 1] * U[1, 0]
-
-
-@kernel
-def _kinematics(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> float:
-    """How far the source's way differs from the shadow's, in units of what is allowed: the largest of both windows.
-
-    Directions are judged one by one: the shadow may know one well and another not at all.
-    """
-    largest = 0.0
-    directions(c, w.S)
-    for window in WINDOWS:
-        if m.block <= window + 3:
-            continue
-        for i in range(3):
-            w.q[i] = way(seen.place[:, i], m.block, window)
-        for axis in range(3):
-            u = w.S[axis]
-            apart = u[0] * w.q[0] + u[1] * w.q[1] + u[2] * w.q[2]
-            if not np.isfinite(apart):
-                continue
-            variance = displacement_variance(window * BLOCK_S, u, m) + 0.5 * seen.scatter * seen.scatter
-            excess = abs(apart) / (c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance))
-            largest = max(largest, excess)
-            if excess > 1.0 and (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S:
-                _ask_inertia(t_ns, window, apart, u, m, c)
-    return float(largest)
-
-
-@kernel
-def _ask_inertia(t_ns: int, window: Integer, apart: float, u: Array, m: Record, c: Record) -> None:
-    """UWB and pixel motion disagree along ``u``: note when inertia alone agrees with UWB, or with neither."""
-    span = window * BLOCK_S
-    carried = third_witness(window, BLOCK_S, u, m)
-    drift2 = 0.25 * m.shadow_q * span * span * span * span
-    variance = displacement_variance(span, u, m) + drift2
-    limit = c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance)
-    if abs(carried) < limit:
-        return
-    m.t_neither = t_ns
-    if abs(apart + carried) < limit:
-        m.t_motion_blamed = t_ns
-
-
-@kernel
 def misfit(seen: Record, m: Record, w: Record, c: Record) -> bool:
     """Whether the place ``w.fix`` of a source does not fit the filter's position; the gap is left in ``w.move``."""
     size2 = 0.0
@@ -175,8 +109,8 @@ def misfit(seen: Record, m: Record, w: Record, c: Record) -> bool:
 
 
 @kernel
-def _judge_uwb(t_ns: int, alone: bool, s: Record, seen: Record, m: Record, w: Record, c: Record) -> None:
-    """One UWB source: where it is, how it moves, which of its anchors do; then its state."""
+def _judge_uwb(t_ns: int, aided: bool, alone: bool, s: Record, seen: Record, m: Record, w: Record, c: Record) -> None:
+    """One UWB source: where it is, how it moves, which of its anchors do, where it pulls; then its state."""
     at = m.block % BLOCKS
     agree = locate(t_ns, s, seen, m, w)
     for i in range(3):
@@ -186,9 +120,10 @@ def _judge_uwb(t_ns: int, alone: bool, s: Record, seen: Record, m: Record, w: Re
         seen.t_fit = t_ns
     for i in range(3):
         seen.gap[i] = w.move[i]
-    aided = (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S and m.imu_fault == 0
-    excess = _kinematics(t_ns, seen, m, w, c) if aided else 0.0
-    if s.kind != UWB_POSITION and _judge_anchors(t_ns, aided, unfit, s, seen, m, w, c):
+    excess = kinematics(t_ns, seen, m, w, c) if aided else 0.0
+    if s.kind != UWB_POSITION and judge_anchors(t_ns, aided, unfit, s, seen, m, w, c):
+        excess = max(excess, 1.01)
+    if m.torn >= TORN_BLOCKS and seen.state == OK and (t_ns - seen.t_fused) * 1e-9 < FUSED_S:
         excess = max(excess, 1.01)
     if excess > CALM:
         seen.t_disagree = t_ns
@@ -203,6 +138,8 @@ def _judge_uwb(t_ns: int, alone: bool, s: Record, seen: Record, m: Record, w: Re
         refused = (t_ns - seen.t_trusted) * 1e-9 > NOT_TRUSTED_S and seen.trust < REFUSED_TRUST
         if unfit and (refused or (t_ns - seen.t_fit) * 1e-9 > UNFIT_S):
             seen.state, seen.t_since = SUSPECT, seen.t_fit
+        elif aided and not blamed and seen.trust < LOW_TRUST:
+            seen.state, seen.t_since = SUSPECT, t_ns
     elif seen.state >= SUSPECT:
         _take_back(t_ns, aided, alone, agree >= ENOUGH_AGREE, unfit, seen, m, c)
     doubted = seen.state == SUSPECT or seen.state == REACQUIRE
@@ -216,7 +153,7 @@ def _take_back(
     """Believe a doubted source again where it fits or, after long patience, by moving the position to it."""
     if (t_ns - seen.t_disagree) * 1e-9 < c.agree_s and aided:
         return
-    if located and not unfit:
+    if located and not unfit and (seen.trust > FAIR_TRUST or not aided):
         seen.state = OK
         _trust_again(t_ns, seen)
         return
@@ -238,60 +175,6 @@ def _trust_again(t_ns: int, seen: Record) -> None:
     for k in range(BLOCKS):
         for i in range(3):
             seen.place[k, i] = np.nan
-
-
-@kernel
-def _judge_anchors(
-    t_ns: int, aided: bool, unfit: bool, s: Record, seen: Record, m: Record, w: Record, c: Record
-) -> bool:
-    """Exclude single anchors whose paths change, or are, otherwise than the filter says.
-
-    Returns whether half of the anchors or more move otherwise than the shadow: then it is the source.
-    """
-    moving, bad, count = 0, 0, 0
-    at = m.block % BLOCKS
-    for i in range(3):
-        lever = w.R[i, 0] * s.lever_B[0] + w.R[i, 1] * s.lever_B[1] + w.R[i, 2] * s.lever_B[2]
-        w.q[i] = m.shadow_p[i] + seen.reference[i] + lever
-        w.fix[i] = m.x[0, POS + i] + lever
-    common = common_length(t_ns, NARROWEST_M, s, seen, w) if s.kind == UWB_TDOA else 0.0
-    for a in range(s.n_anchors):
-        heard = (t_ns - seen.t_heard[a]) * 1e-9 < HEARD_S
-        seen.ring[a, at] = seen.offset[a] - common if heard else np.nan
-        if unfit or not heard:
-            continue
-        apart = abs(seen.offset[a] - common + path_length(w.q, s.anchors[a]) - path_length(w.fix, s.anchors[a]))
-        moved = 0.0
-        if aided:
-            for window in WINDOWS:
-                moved = max(moved, _anchor_excess(window, a, s, seen, m, w, c))
-        count += 1
-        moving += 1 if moved > 1.0 else 0
-        if apart > c.anchor_m or moved > 1.0:
-            seen.anchor_bad[a] = 1
-            seen.bad_block[a] = m.block
-        elif apart > CALM * c.anchor_m or moved > CALM:
-            seen.bad_block[a] = m.block
-        elif (m.block - seen.bad_block[a]) * BLOCK_S > c.agree_s:
-            seen.anchor_bad[a] = 0
-        bad += seen.anchor_bad[a]
-    if not aided and 2 * bad > count:  # then it is the filter that is wrong
-        for a in range(s.n_anchors):
-            seen.anchor_bad[a] = 0
-    return moving > 0 and 2 * moving >= count
-
-
-@kernel
-def _anchor_excess(window: Integer, a: Integer, s: Record, seen: Record, m: Record, w: Record, c: Record) -> float:
-    """Change of one path beside the shadow, in units of what is allowed."""
-    change = way(seen.ring[a], m.block, window)
-    if not (m.block > window + 3 and np.isfinite(change)):
-        return 0.0
-    distance = max(path_length(w.q, s.anchors[a]), 0.05)
-    for i in range(3):
-        w.ray[i] = (w.q[i] - s.anchors[a, i]) / distance
-    variance = displacement_variance(window * BLOCK_S, w.ray, m) + 0.5 * seen.scatter * seen.scatter
-    return float(abs(change) / (c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance)))
 
 
 @kernel

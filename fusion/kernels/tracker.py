@@ -2,8 +2,9 @@ r"""What UWB says relative to the shadow's path: one slowly moving offset per an
 
 A range to anchor a is followed as :math:`o_a = z - |q - a|` with the antenna q on the shadow's path, a difference as
 :math:`o_b - o_a`, a fix per axis.  The offsets move with the honest readings; a reading far from its offset is a jump:
-it is refused, and the offset follows only when several come in a row.  The same place in the code knows whether a
-value has been repeating itself while the vehicle moved.
+it is refused, and the offset follows only when several come in a row.  Then the path has a new level, which the anchor
+of a range has to explain before it is used again.  The same place in the code knows whether a value has been repeating
+itself while the vehicle moved.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
 JUMP, STUCK, SUPERVISOR = int(Reason.JUMP), int(Reason.STUCK), int(Reason.SUPERVISOR)
+COPY = int(Reason.COPY)
 FOLLOW_S = 0.2  # time constant of the offsets
 LEAST_BLEND, MOST_BLEND = 0.02, 0.5
 FORGET_S = 1.0  # of silence, after which an offset starts from the next reading
 IN_A_ROW = 3  # so many jumps are a new level
+STEPPED = 2  # mark of an anchor whose path has taken a new level
 SCATTER_BLEND = 0.02
 SCATTER_LEAST_M = 0.03
 MAD_TO_SIGMA = 1.2533  # of a normal distribution: sigma over mean absolute deviation
@@ -67,6 +70,8 @@ def follow(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Reco
         expected -= path_length(w.q, s.anchors[near])
         told -= seen.offset[near]
     stuck = _repeats(far, z, expected, seen, c)
+    if near < 0 and _is_copy(far, values[3] + values[4], seen):
+        return STUCK if stuck else COPY
     gap_s = (t_ns - seen.t_heard[far]) * 1e-9
     seen.t_heard[far] = t_ns
     new = gap_s > FORGET_S
@@ -79,13 +84,16 @@ def follow(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Reco
         seen.offset[far] += z - expected - told
         told = z - expected
     step = _take(far, z - expected - told, gap_s, seen, c)
+    if near < 0 and seen.outside[far] == IN_A_ROW + 1:
+        # of one path alone: a reflection that comes or goes, not the vehicle
+        seen.anchor_bad[far], seen.bad_block[far] = STEPPED, m.block
     share = 0.5 if near >= 0 else 1.0
     seen.offset[far] += share * step
     if near >= 0:
         seen.offset[near] -= share * step
     if stuck:
         return STUCK
-    if seen.anchor_bad[far] == 1 or (near >= 0 and seen.anchor_bad[near] == 1):
+    if seen.anchor_bad[far] > 0 or (near >= 0 and seen.anchor_bad[near] > 0):
         return SUPERVISOR
     return JUMP if seen.outside[far] > 0 else 0
 
@@ -131,6 +139,17 @@ def _repeats(channel: Integer, value: float, expected: float, seen: Record, c: R
         seen.expected[channel] = expected
     stands = seen.repeats[channel] >= c.stuck_count
     return bool(stands and abs(expected - seen.expected[channel]) > c.stuck_m)
+
+
+@kernel
+def _is_copy(channel: Integer, power_dbm: float, seen: Record) -> bool:
+    """Whether range and both powers are those of the reading before: it says what has been and is late.
+
+    Some receivers repeat what they know whenever they are asked.  Without powers nobody can tell.
+    """
+    same = power_dbm == seen.power[channel] and seen.repeats[channel] > 0
+    seen.power[channel] = power_dbm
+    return bool(same)
 
 
 @kernel

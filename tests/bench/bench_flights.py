@@ -17,9 +17,10 @@ import numpy as np
 from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.reference import match
 from axialnav.replay.run import Run, replay
-from tests.bench.flights import CASES, FLIGHTS, VARIANTS, Case
+from tests.bench.flights import CASES, CHANGES, FLIGHTS, VARIANTS, Case
 from tests.bench.markdown import machine, number, table
 from tests.bench.slider import slider_table
+from tests.bench.wrong_uwb import wrong_uwb_tables
 
 HEAD = (
     "flight", "axial velocity asked", "measured [m/s]", "position asked [m]", "x y z [m]", "3-D [m]", "farthest [m]",
@@ -131,19 +132,22 @@ def tables(cases: Sequence[Case], folder: Path, variants: Mapping[str, Mapping[s
             absent.append(case.flight)
             continue
         loaded[case.flight] = loaded.get(case.flight) or load_flight(folder / case.flight)
-        results.append({name: measure(loaded[case.flight], case, params) for name, params in variants.items()})
+        flight = loaded[case.flight]
+        by_name = {name: measure(flight, case, params) for name, params in variants.items()}
+        results.append(by_name | {name: measure(change(flight), case, {}) for name, change in CHANGES.items()})
     lines = [f"skipped: {name} is not in {folder}" for name in dict.fromkeys(absent)]
     if results:
         first = next(iter(variants))
         lines += ["One configuration for all flights:", "", table(HEAD, (result_row(r[first]) for r in results)), ""]
         lines += ["What each feature buys, as axial velocity RMSE [m/s] / 3-D position RMSE [m] (speed RMSE for GPS):"]
-        lines += ["", table(("flight", *variants), variant_rows(results, tuple(variants)))]
+        lines += ["", table(("flight", *results[0]), variant_rows(results, tuple(results[0])))]
     return "\n".join(lines)
 
 
 def main() -> None:
     """Print all tables."""
-    sys.stdout.write(f"{machine()}\n\n{tables(CASES, FLIGHTS)}\n\n{slider_table(FLIGHTS)}\n")
+    parts = (machine(), tables(CASES, FLIGHTS), wrong_uwb_tables(FLIGHTS), slider_table(FLIGHTS))
+    sys.stdout.write("\n\n".join(parts) + "\n")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+
+from axialnav.replay.flight import Flight
+from tests.bench.changed import late, turning
 
 FLIGHTS = Path(__file__).resolve().parents[2].parent / "shared" / "flights"
 
@@ -99,3 +103,4 @@ VARIANTS: dict[str, dict[str, str]] = {
     "right-handed": RIGHT_HANDED,
     "plain": PLAIN,
 }
+CHANGES: dict[str, Callable[[Flight], Flight]] = {"rotation ignored": turning, "0.1 s late": late}

@@ -28,8 +28,8 @@ def test_the_flight_tables_show_a_limit_that_is_kept_and_one_that_is_not() -> No
     assert kept[-1] == "ok"
     assert missed[0] == f"{SAMPLE.name} without tof0"
     assert missed[-1] == "SHORT: speed"
-    compared = [row for row in cells(text, SAMPLE.name) if len(row) == 3]
-    assert [bool(re.fullmatch(r"\d+\.\d{3}", value)) for row in compared for value in row[1:]] == [True] * 4
+    compared = [row for row in cells(text, SAMPLE.name) if len(row) == 5]
+    assert [bool(re.fullmatch(r"\d+\.\d{3}", value)) for row in compared for value in row[1:]] == [True] * 8
 
 
 def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
