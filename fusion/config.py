@@ -107,8 +107,9 @@ class ImuFault(_Table, frozen=True, kw_only=True):
     """When the accelerometer stops being believed, and how it is treated then.
 
     The aids' corrections of velocity are watched.  Where they ask for more than ``doubt_m_s2`` on average over
-    ``doubt_time_s``, a rival filter with ``noise_scale`` times the accelerometer noise and the bias walk ``bias_walk``
-    [m s^-3 Hz^-1/2] runs beside for ``trial_s`` on the same readings.  It takes over when the readings are
+    ``doubt_time_s``, and for ``doubt_sigmas`` times what noise would ask for, a rival filter with ``noise_scale`` times
+    the accelerometer noise and the bias walk ``bias_walk`` [m s^-3 Hz^-1/2] runs beside for ``trial_s`` on the same
+    readings; it is given up early when they speak against it.  It takes over when the readings are
     exp(``evidence``) times as likely under it; it hands back after ``trials_to_clear`` trials in a row in which the
     healthy filter explains them nearly as well (less than exp(``evidence_to_clear``) times worse).
     """
@@ -117,6 +118,7 @@ class ImuFault(_Table, frozen=True, kw_only=True):
     noise_scale: Positive = 5.0
     bias_walk: Positive = 1.0
     doubt_m_s2: Positive = 0.3
+    doubt_sigmas: NonNegative = 4.0
     doubt_time_s: Positive = 0.5
     trial_s: Positive = 2.0
     evidence: Positive = 50.0

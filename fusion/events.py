@@ -129,7 +129,12 @@ def after_stamp_ns(kind: Kind, first_value: NDArray[np.float64]) -> NDArray[np.i
     """
     if kind not in {Kind.FLOW, Kind.BLUR}:
         return np.zeros(first_value.shape, dtype=np.int64)
-    return np.round(0.5e9 * first_value).astype(np.int64)
+    return np.array([half_window_ns(window_s) for window_s in first_value.tolist()], dtype=np.int64)
+
+
+def half_window_ns(window_s: float) -> int:
+    """Half of a window, rounded [ns]: the one place where it is, for single readings and for tables."""
+    return round(0.5e9 * window_s)
 
 
 def _pack_columns(table: Table, names: tuple[str, ...]) -> NDArray[np.float64]:

@@ -42,6 +42,7 @@ MEMORY: Final = np.dtype(
         ("imu_fault", "i8"),
         ("on_trial", "i8"),
         ("t_trial", "i8"),
+        ("t_failed", "i8"),  # end of the last trial of a healthy rival that spoke clearly against it
         ("good_trials", "i8"),
         ("evidence", "f8"),  # log-likelihood of the rival minus that of the estimate
         # integrals of rate and acceleration since the start, and their values at instants of the past
@@ -54,7 +55,9 @@ MEMORY: Final = np.dtype(
         ("path_heard", "i8", N_BIASES),
         ("path_variance", "f8", N_BIASES),
         ("correction", "f8", 3),  # sum of velocity corrections since the last inertial step [m/s]
+        ("correction_variance", "f8", 3),  # and the variance expected of it
         ("correction_rate", "f8", 3),  # their fading mean [m/s^2]
+        ("correction_rate_variance", "f8", 3),
         # the shadow: the vehicle without UWB (kernels.shadow)
         ("shadow_p", "f8", 3),
         ("shadow_v", "f8", 3),
@@ -122,7 +125,7 @@ SCRATCH: Final = np.dtype(
         ("F", "f8", (9, 3)), ("Q", "f8", N_ERROR), ("ray", "f8", 11), ("p", "f8", 3), ("mean_imu", "f8", 6),
         ("focal_window", "f8", 2), ("row", "f8", 11), ("repeated", "f8"), ("normal", "f8", 3), ("plane", "f8", 2),
         ("x", "f8", N_NOMINAL), ("rate", "f8", 3), ("gained", "f8", 3), ("first", "f8", 6), ("mid", "f8", 6),
-        ("last", "f8", 6), ("look", "f8", 3),
+        ("last", "f8", 6), ("look", "f8", 3), ("spread", "f8", 3),
         ("q", "f8", 3), ("fix", "f8", 3), ("move", "f8", 3), ("rhs", "f8", 3), ("prior", "f8", 3), ("common", "f8"),
         ("column", "f8", COLUMNS), ("column_H", "f8", (COLUMNS, N_ERROR)), ("weight", "f8", COLUMNS),
         ("would", "f8"), ("refused", "i8"), ("v_before", "f8", 3), ("ways", "f8", (2, MAX_ANCHORS)),
@@ -162,7 +165,7 @@ def new_memory(n_sources: int) -> Memory:
     sources["trust"], sources["scatter"] = 1.0, SCATTER_START_M
     core = np.zeros(1, MEMORY)
     core["path"], core["path_heard"] = -1, LONG_AGO
-    for stamp in ("t_shadow", "t_motion_blamed", "t_neither"):
+    for stamp in ("t_failed", "t_shadow", "t_motion_blamed", "t_neither"):
         core[stamp] = LONG_AGO
     return Memory(core, sources)
 
@@ -175,8 +178,8 @@ def new_scratch() -> Records:
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
     "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_time_s", "uwb_bias_length_m",
-    "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_time_s", "trial_s",
-    "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
+    "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_sigmas", "doubt_time_s",
+    "trial_s", "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
     "reanchor_aided_s", "reanchor_alone_s",
     "supervised", "timeout_s", "shadow_m_s2", "kinematic_m", "kinematic_sigmas", "agree_s", "fit_m", "anchor_m",
     "jump_m", "jump_sigmas", "stuck_count", "stuck_m", "nlos_db", "nlos_scale_db",
@@ -227,6 +230,7 @@ def build_settings(config: Config) -> Records:
         "uwb_correlation_s": config.uwb.correlation_time_s,
         "height_correlation_s": config.height.correlation_time_s,
         "doubt_m_s2": fault.doubt_m_s2 if fault.enabled else np.inf,
+        "doubt_sigmas": fault.doubt_sigmas,
         "doubt_time_s": fault.doubt_time_s,
         "trial_s": fault.trial_s,
         "evidence": fault.evidence,

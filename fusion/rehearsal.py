@@ -5,6 +5,7 @@ The likelihood of a trial is that of its innovations, seen through the gate, so 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from axialnav.fusion.config import Config
 from axialnav.fusion.events import Events, Table, pack_tables
 from axialnav.fusion.handedness import mirror_config, mirror_tables
 from axialnav.fusion.kernels.measure import repetition
-from axialnav.fusion.kernels.run import run
+from axialnav.fusion.kernels.run import mean_gap, run
 from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, build_settings, new_memory, new_scratch
 from axialnav.fusion.outcome import InnovationLog, Verdict
@@ -26,7 +27,6 @@ from axialnav.models.scalar_kernel import threaded_kernel
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-GAP_BLEND = 0.02
 KEPT = 8  # packings, for delays on trial
 
 
@@ -206,9 +206,8 @@ def _repetition(events: Events, read: NDArray[np.bool_], src: Records, correlati
 
 def _gaps(t_ns: Ints) -> list[float]:
     """Fading mean of the time between readings, as the filter knows it at each of them [s]; NaN at the first."""
-    gaps, known = [], np.nan
+    gaps, known = [], math.nan
     for gap_s in np.diff(t_ns, prepend=-(2**61)) * 1e-9:
-        if gap_s < 1.0:
-            known = known + GAP_BLEND * (gap_s - known) if np.isfinite(known) else max(gap_s, 1e-3)
-        gaps.append(float(known))
+        known = mean_gap(known, gap_s)
+        gaps.append(known)
     return gaps

@@ -30,21 +30,9 @@ def predict_covariance(P: Array, F: Array, dt: float, uwb_decay: float, Q: Array
     ``F`` (9, 3) holds the blocks written by :func:`axialnav.models.imu.strapdown`, ``uwb_decay`` the Gauss-Markov
     factor of the UWB biases over the step, ``Q`` (25,) the discrete noise.
     """
-    for j in range(N):
-        for i in range(3):
-            P[i, j] += dt * P[3 + i, j]
-    for i in range(3):
-        f0, f1, f2 = F[i, 0], F[i, 1], F[i, 2]
-        b0, b1, b2 = F[3 + i, 0], F[3 + i, 1], F[3 + i, 2]
-        for j in range(N):
-            P[3 + i, j] += f0 * P[6, j] + f1 * P[7, j] + f2 * P[8, j] - b0 * P[12, j] - b1 * P[13, j] - b2 * P[14, j]
-    for j in range(N):
-        t0, t1, t2 = P[6, j], P[7, j], P[8, j]
-        P[6, j] = F[6, 0] * t0 + F[6, 1] * t1 + F[6, 2] * t2 - dt * P[9, j]
-        P[7, j] = F[7, 0] * t0 + F[7, 1] * t1 + F[7, 2] * t2 - dt * P[10, j]
-        P[8, j] = F[8, 0] * t0 + F[8, 1] * t1 + F[8, 2] * t2 - dt * P[11, j]
+    _predict_rows(P, F, dt)
     for i in range(CORE):
-        _predict_row(P[i], F, dt)
+        _predict_columns(i, P[i], F, dt)
     for i in range(CORE):
         for j in range(E_UWB_BIAS, N):
             P[i, j] *= uwb_decay
@@ -62,16 +50,42 @@ def predict_covariance(P: Array, F: Array, dt: float, uwb_decay: float, Q: Array
 
 
 @kernel
-def _predict_row(row: Array, F: Array, dt: float) -> None:
-    """Apply the column pass of ``Phi'`` to one row of the core."""
+def _predict_rows(P: Array, F: Array, dt: float) -> None:
+    """Apply ``Phi`` from the left to the rows of the core, as far as the upper triangle needs it."""
+    for i in range(3):
+        for j in range(N):
+            P[i, j] += dt * P[3 + i, j]
+    for i in range(3):
+        f0, f1, f2 = F[i, 0], F[i, 1], F[i, 2]
+        b0, b1, b2 = F[3 + i, 0], F[3 + i, 1], F[3 + i, 2]
+        for j in range(3, N):
+            P[3 + i, j] += f0 * P[6, j] + f1 * P[7, j] + f2 * P[8, j] - b0 * P[12, j] - b1 * P[13, j] - b2 * P[14, j]
+    # held in variables: the compiler cannot know that a store to P leaves F alone
+    r0, r1, r2 = F[6, 0], F[6, 1], F[6, 2]
+    s0, s1, s2 = F[7, 0], F[7, 1], F[7, 2]
+    u0, u1, u2 = F[8, 0], F[8, 1], F[8, 2]
+    for j in range(6, N):
+        t0, t1, t2 = P[6, j], P[7, j], P[8, j]
+        P[6, j] = r0 * t0 + r1 * t1 + r2 * t2 - dt * P[9, j]
+        P[7, j] = s0 * t0 + s1 * t1 + s2 * t2 - dt * P[10, j]
+        P[8, j] = u0 * t0 + u1 * t1 + u2 * t2 - dt * P[11, j]
+
+
+@kernel
+def _predict_columns(i: int, row: Array, F: Array, dt: float) -> None:
+    """Apply ``Phi'`` from the right to row ``i`` of the core, as far as it lies in the upper triangle (by blocks)."""
     t0, t1, t2 = row[6], row[7], row[8]
     a0, a1, a2 = row[12], row[13], row[14]
-    for i in range(3):
-        row[i] += dt * row[3 + i]
-        row[3 + i] += (
-            F[i, 0] * t0 + F[i, 1] * t1 + F[i, 2] * t2 - F[3 + i, 0] * a0 - F[3 + i, 1] * a1 - F[3 + i, 2] * a2
-        )
-        row[6 + i] = F[6 + i, 0] * t0 + F[6 + i, 1] * t1 + F[6 + i, 2] * t2 - dt * row[9 + i]
+    if i < 3:
+        for k in range(3):
+            row[k] += dt * row[3 + k]
+    if i < 6:
+        for k in range(3):
+            row[3 + k] += (
+                F[k, 0] * t0 + F[k, 1] * t1 + F[k, 2] * t2 - F[3 + k, 0] * a0 - F[3 + k, 1] * a1 - F[3 + k, 2] * a2
+            )
+    for k in range(3):
+        row[6 + k] = F[6 + k, 0] * t0 + F[6 + k, 1] * t1 + F[6 + k, 2] * t2 - dt * row[9 + k]
 
 
 @kernel
@@ -86,7 +100,8 @@ def project(P: Array, H: Array, PHt: Array) -> float:
                 PHt[j] += h * P[k, j]
     variance = 0.0
     for k in range(N):
-        variance += H[k] * PHt[k]
+        if H[k] != 0.0:
+            variance += H[k] * PHt[k]
     return variance
 
 

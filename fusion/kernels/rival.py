@@ -19,19 +19,29 @@ from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import N_ERROR, N_NOMINAL
 
 Array = NDArray[np.float64]
+GIVE_UP = 5.0  # nats by which the healthy filter has to be better for a trial to end early; doubt starts another
 
 
 @kernel
 def in_doubt(dt: float, m: Record, c: Record) -> bool:
-    """Update the mean velocity correction [m/s^2] that the aids ask for; whether it is more than a bias could be."""
+    """Update the mean velocity correction [m/s^2] that the aids ask for; whether it is more than a bias could be.
+
+    It is where the mean is large, and larger than noise would make it: a filter that is right expects corrections of
+    the variance that it gives them, and their mean over a while to be near zero.
+    """
     decay = math.exp(-dt / c.doubt_time_s)
-    size2 = 0.0
+    size2, sigmas2 = 0.0, 0.0
     for i in range(3):
         rate = m.correction_rate[i] * decay + m.correction[i] / c.doubt_time_s
+        variance = m.correction_rate_variance[i] * decay * decay
+        variance += m.correction_variance[i] / (c.doubt_time_s * c.doubt_time_s)
         m.correction_rate[i] = rate
+        m.correction_rate_variance[i] = variance
         m.correction[i] = 0.0
+        m.correction_variance[i] = 0.0
         size2 += rate * rate
-    return bool(size2 > c.doubt_m_s2 * c.doubt_m_s2)
+        sigmas2 += rate * rate / variance if variance > 0.0 else 0.0
+    return bool(size2 > c.doubt_m_s2 * c.doubt_m_s2 and sigmas2 > c.doubt_sigmas * c.doubt_sigmas)
 
 
 @kernel
@@ -42,7 +52,8 @@ def supervise_imu(dt: float, m: Record, c: Record) -> None:
     if m.on_trial == 1:
         _judge(fault, (m.t_imu - m.t_trial) * 1e-9 > c.trial_s, m, c)
         fault = m.imu_fault == 1
-    if m.on_trial == 0 and (fault or doubtful):
+    rested = (m.t_imu - m.t_failed) * 1e-9 > c.trial_s
+    if m.on_trial == 0 and ((fault and rested) or (doubtful and not fault)):
         m.on_trial = 1
         m.t_trial = m.t_imu
         m.evidence = 0.0
@@ -56,6 +67,7 @@ def _judge(fault: bool, over: bool, m: Record, c: Record) -> None:
         if evidence < -c.evidence:
             m.on_trial = 0
             m.good_trials = 0
+            m.t_failed = m.t_imu
         elif over:
             m.on_trial = 0
             m.good_trials = m.good_trials + 1 if evidence >= -c.evidence_to_clear else 0
@@ -63,7 +75,7 @@ def _judge(fault: bool, over: bool, m: Record, c: Record) -> None:
                 _take_over(m)
     elif evidence > c.evidence:
         _take_over(m)
-    elif over:
+    elif over or evidence < -GIVE_UP:
         m.on_trial = 0
 
 
@@ -75,6 +87,7 @@ def _take_over(m: Record) -> None:
     m.good_trials = 0
     for i in range(3):
         m.correction_rate[i] = 0.0
+        m.correction_rate_variance[i] = 0.0
     copy_filter(m.x[1], m.P[1], m.x[0], m.P[0])
 
 

@@ -46,7 +46,7 @@ OFF, ALIGNING, OK = int(SourceState.OFF), int(SourceState.ALIGNING), int(SourceS
 SUSPECT, REACQUIRE = int(SourceState.SUSPECT), int(SourceState.REACQUIRE)
 BLOCK_NS = round(BLOCK_S * 1e9)
 NOT_ALIGNED = int(Reason.NOT_ALIGNED)
-GAP_BLEND = 0.02
+GAP_BLEND, SILENCE_S, LEAST_GAP_S = 0.02, 1.0, 1e-3
 RESET_SHOWN_S = 1.0
 
 
@@ -138,12 +138,18 @@ def note_arrival(t_ns: int, gap_s: float, kind: int, values: Array, seen: Record
     """Learn how often the source speaks and, for heights, where its zero is."""
     if seen.state == OFF:
         seen.state, seen.t_first, seen.t_fit = ALIGNING, t_ns, t_ns
-    if gap_s < 1.0:
-        known = np.isfinite(seen.gap_s)
-        seen.gap_s = seen.gap_s + GAP_BLEND * (gap_s - seen.gap_s) if known else max(gap_s, 1e-3)
+    seen.gap_s = mean_gap(seen.gap_s, gap_s)
     seen.t_seen = t_ns
     if kind == HEIGHT and not np.isfinite(seen.datum_m):
         seen.datum_m = values[0] - m.x[0, POS + 2]
+
+
+@kernel
+def mean_gap(known_s: float, gap_s: float) -> float:
+    """Fading mean of the time between readings [s], NaN before the second; silence is no gap."""
+    if not gap_s < SILENCE_S:
+        return known_s
+    return known_s + GAP_BLEND * (gap_s - known_s) if np.isfinite(known_s) else max(gap_s, LEAST_GAP_S)
 
 
 @kernel

@@ -56,7 +56,7 @@ def obstructed(power_difference_db: float, c: Record) -> float:
 
 @kernel
 def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
-    """Try one reading on filter ``row``; leave its record in ``w.row`` (10,) and return its log-likelihood.
+    """Try one reading on filter ``row``; leave its record in ``w.row`` (11,) and return its log-likelihood, in a trial.
 
     The log-likelihood is bounded (the NIS counts at most as much as the gate) and that of UWB divided by the number of
     readings that repeat each other: what bias states leave of their likeness must not decide over the accelerometer.
@@ -77,7 +77,7 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     if s.kind == UWB_RANGE:
         w.variance[0] *= obstructed(values[3] - values[4], c)
     repeated = w.repeated
-    nis, log_det = _innovate(axes, repeated, P, w)
+    nis, det = _innovate(axes, repeated, P, w)
     if not np.isfinite(nis):
         w.row[LOG_CODE] = -NOT_FINITE
         return 0.0
@@ -90,13 +90,16 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
         if row == 0:
             for k in range(3):
                 m.correction[k] += w.step[E_VEL + k]
+                m.correction_variance[k] += w.spread[k]
     elif row == 0 and w.refused == 0:
         _note_refused(axes, repeated, REFUSED_COUNTS * math.sqrt(gate / nis), P, m, w)
     if w.refused > 0:
         w.row[LOG_REASON] = w.refused
         return 0.0
+    if m.on_trial == 0:
+        return 0.0  # nobody asks
     alike = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
-    return float(-0.5 * (min(nis, gate) + log_det) / alike)
+    return float(-0.5 * (min(nis, gate) + math.log(det)) / alike)
 
 
 @kernel
@@ -106,11 +109,12 @@ def _note_refused(axes: int, repeated: float, cap: float, P: Array, m: Record, w
         S = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
         for k in range(3):
             m.correction[k] += w.PHt[E_VEL + k] / S * cap * (w.z[i] - w.h[i])
+            m.correction_variance[k] += w.PHt[E_VEL + k] * w.PHt[E_VEL + k] / S
 
 
 @kernel
 def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, float]:
-    """Normalised innovation squared of all axes jointly, and log det S, by one elimination pass."""
+    """Normalised innovation squared of all axes jointly, and det S, by one elimination pass."""
     S, y = w.S, w.y
     for i in range(axes - 1, -1, -1):  # the first axis last: the update begins with its P H'
         y[i] = w.z[i] - w.h[i]
@@ -123,17 +127,17 @@ def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, f
                 cross += w.H[j, k] * w.PHt[k]
             S[j, i] = cross
             S[i, j] = cross
-    nis, log_det = 0.0, 0.0
+    nis, det = 0.0, 1.0
     for i in range(axes):
         pivot = S[i, i]
         nis += y[i] * y[i] / pivot
-        log_det += math.log(pivot)
+        det *= pivot
         for j in range(i + 1, axes):
             factor = S[j, i] / pivot
             y[j] -= factor * y[i]
             for k in range(i + 1, axes):
                 S[j, k] -= factor * S[i, k]
-    return nis, log_det
+    return nis, det
 
 
 @kernel
@@ -144,14 +148,19 @@ def _apply(axes: int, repeated: float, inflation: float, x: Array, P: Array, w: 
     """
     for k in range(N_ERROR):
         w.step[k] = 0.0
+    for k in range(3):
+        w.spread[k] = 0.0
     for i in range(axes):
         if i == 0:
             S = w.S[0, 0] + w.variance[0] * (inflation - repeated)
         else:
             S = project(P, w.H[i], w.PHt) + w.variance[i] * inflation
         innovation = w.z[i] - w.h[i]
-        for k in range(N_ERROR):
-            innovation -= w.H[i, k] * w.step[k]
+        if i > 0:
+            for k in range(N_ERROR):
+                innovation -= w.H[i, k] * w.step[k]
         correct(x, P, w.PHt, S, innovation, w.gain)
         for k in range(N_ERROR):
             w.step[k] += w.gain[k] * innovation
+        for k in range(3):
+            w.spread[k] += w.gain[E_VEL + k] * w.gain[E_VEL + k] * S

@@ -38,6 +38,7 @@ class Kernel:
         c = config(measurement)
         self.source = build_sources(c)[fused_sensors(c).index("uwb0")]
         self.settings, self.memory, self.scratch = build_settings(c)[0], new_memory(2), new_scratch()[0]
+        self.memory.core["on_trial"] = 1  # only then is the likelihood worked out
         self.memory.core["x"][0, 0], self.memory.core["P"][0, 0] = x, P
         self.memory.core["path"], self.memory.core["path_heard"] = self.source["first_path"] + np.arange(8), 0
 
