@@ -40,7 +40,8 @@ from axialnav.models.rig import (
 
 STEP_NS = 10_000_000
 USUAL_CAMERA_HZ = 30.0
-STEP_PX = 3
+STEP_PX = 9
+SHAKE_PX = 2
 CONTRAST = 30.0
 ROUGHNESS = 0.03  # cycles a pixel, up to which the wall has all its texture
 
@@ -100,21 +101,30 @@ def _aid(name: str, spec: AnySensor, t_ns: int) -> Iterator[Reading]:
 def warm_camera(config: Config, name: str, spec: Camera) -> None:
     """Measure the motion of a made-up wall: of pictures that are refused early, little would be compiled."""
     period_ns = round(1e9 / (spec.rate_hz or USUAL_CAMERA_HZ))
-    for exposure_s in (None, 0.3e-9 * period_ns):
+    for exposure_s, step_px, shake_px in ((None, 0, 0), (0.3e-9 * period_ns, STEP_PX, SHAKE_PX)):
         feed = CameraFeed(config)
-        for k, image in enumerate(wall_pictures(spec.resolution, config.camera.frames + 2)):
+        for k, image in enumerate(wall_pictures(spec.resolution, config.camera.frames + 2, step_px, shake_px)):
             with suppress(FrameError):
                 feed.push(CameraFrame(t_ns=k * period_ns, sensor=name, image=image, exposure_s=exposure_s))
 
 
-def wall_pictures(resolution: tuple[int, int], count: int) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of a rough wall that passes by, shape (height, width), each with its own noise."""
+def wall_pictures(
+    resolution: tuple[int, int], count: int, step_px: int, shake_px: int = 0
+) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of a rough wall that passes by, shape (height, width), each with its own noise.
+
+    Every other picture is rolled, so that its upper and lower edges move by ``shake_px`` either way.
+    """
     width, height = resolution
+    whole = width + step_px * count + 2 * shake_px
     rng = np.random.Generator(np.random.PCG64(0))
-    texture = np.fft.rfft2(rng.normal(size=(height, width + STEP_PX * count)))
-    down, along = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(width + STEP_PX * count)[None, :]
-    wall = np.fft.irfft2(texture / (1.0 + (down**2 + along**2) / ROUGHNESS**2), s=(height, width + STEP_PX * count))
+    texture = np.fft.rfft2(rng.normal(size=(height, whole)))
+    down, along = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(whole)[None, :]
+    wall = np.fft.irfft2(texture / (1.0 + (down**2 + along**2) / ROUGHNESS**2), s=(height, whole))
     wall *= CONTRAST / wall.std()
+    rolled = np.round(shake_px * np.linspace(-1.0, 1.0, height)).astype(np.int64)
+    columns = np.arange(width)
     for k in range(count):
-        seen = 128.0 + wall[:, STEP_PX * k : STEP_PX * k + width] + rng.normal(0.0, 1.0, (height, width))
-        yield np.clip(seen, 0.0, 255.0).astype(np.uint8)
+        first = shake_px + step_px * k + (rolled if k % 2 else np.zeros_like(rolled))
+        seen = np.take_along_axis(wall, first[:, None] + columns, axis=1)
+        yield np.clip(128.0 + seen + rng.normal(0.0, 1.0, seen.shape), 0.0, 255.0).astype(np.uint8)

@@ -101,10 +101,10 @@ class Hour:
             node.autopilot.clock.exchange(self.now_ns - 400_000, self.streamed.boot(t - 200e-6), self.now_ns)
             node.autopilot.tick(self.now_ns)
             node.output.step()
-            node.status()
 
     def close(self) -> None:
         self.recording.close()
+        self.streamed.socket.close()
 
 
 def resident_mib() -> float:

@@ -143,7 +143,7 @@ def test_the_warm_up_measures_its_wall() -> None:
         feed = CameraFeed(config)
         motions = [
             feed.push(CameraFrame(t_ns=k * 33_333_333, sensor="cam0", image=image))
-            for k, image in enumerate(wall_pictures(resolution, 6))
+            for k, image in enumerate(wall_pictures(resolution, 6, 9))
         ]
         assert motions[-1] is not None
-        assert motions[-1].dx_px == pytest.approx(-3.0, abs=0.05)
+        assert motions[-1].dx_px == pytest.approx(-9.0, abs=0.05)
