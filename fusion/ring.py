@@ -17,7 +17,7 @@ from axialnav.fusion.memory import MEMORY, SOURCE_MEMORY, Memory, Records, new_m
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]
 
-STRIDE: Final = 16  # events between snapshots: a late reading runs this many again at most, beside the later ones
+STRIDE: Final = 64  # events between snapshots: a late reading runs this many again at most, beside the later ones
 CAPACITY: Final = 1024
 
 HEAD: Final = np.dtype(

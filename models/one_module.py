@@ -102,7 +102,9 @@ class WholeLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == codegen.ll.Linkage.linkonce_odr:
-                function.linkage = "internal"  # inlined where it is called once, and left out where it never is
+                # inlined where it is called once, and left out where it never is; without a name in the object code,
+                # because the loader would hand out a function whose arguments were optimised away under that name
+                function.linkage = "private"
         manager, builder = self._codegen._module_pass_manager()
         manager.run(self._final_module, builder)
 
