@@ -15,6 +15,14 @@ from axialnav.replay.cli_tune import write_text
 Names = Annotated[list[str] | None, Parameter(negative=(), consume_multiple=False)]
 
 
+COLUMNS = {
+    "axial_rmse": "axial RMSE",
+    "horizontal_speed_rmse_m_s": "speed RMSE",
+    "position_rmse_3d_m": "position RMSE",
+    "nees_velocity": "NEES",
+}
+
+
 def sweep(
     *logs: Path,
     param: Names = None,
@@ -80,10 +88,10 @@ def _table(rows: list[dict[str, Any]], before: int, out: Path) -> list[str]:
     from axialnav.replay.table import aligned
 
     good = [row for row in rows if row["error"] is None]
-    cells = [["settings", "flights", "axial RMSE", "position RMSE", "NEES"]]
+    cells = [["settings", "flights", *COLUMNS.values()]]
     for params, count, means in by_settings(good):
         name = ", ".join(f"{k}={v}" for k, v in params.items()) or "as configured"
-        scores = [means[key] for key in ("axial_rmse", "position_rmse_3d_m", "nees_velocity")]
+        scores = [means[key] for key in COLUMNS]
         cells.append([name, str(count), *("-" if value is None else f"{value:.4g}" for value in scores)])
     lines = [f"sweep      {len(rows)} replays, {before} of them done before, {len(rows) - len(good)} failed"]
     lines += aligned(cells) if good else []

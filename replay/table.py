@@ -168,7 +168,7 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> Iterat
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = (c.ljust(w) if i in left else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True)))
-        yield "   ".join(cells).rstrip()
+        yield "  ".join(cells).rstrip()
 
 
 def _count(value: int) -> str:

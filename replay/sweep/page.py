@@ -6,7 +6,15 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
-SCORES = ("axial_rmse", "axial_mean_error", "axial_in_3_sigma", "position_rmse_3d_m", "nees_velocity", "resets")
+SCORES = (
+    "axial_rmse",
+    "axial_mean_error",
+    "axial_in_3_sigma",
+    "horizontal_speed_rmse_m_s",
+    "position_rmse_3d_m",
+    "nees_velocity",
+    "resets",
+)
 STYLE = """
 :root { color-scheme: light dark; font: 15px/1.45 system-ui, sans-serif; }
 body { margin: 2rem auto; max-width: 70rem; padding: 0 1rem; }

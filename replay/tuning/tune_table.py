@@ -56,10 +56,10 @@ def _couples(tuning: Tuning) -> Iterator[str]:
 
 
 def _scores(scores: Sequence[Score]) -> Iterator[str]:
-    head = ["flight", "", "log-likelihood", "axial RMSE", "sensor", "mean NIS", "lag-1", "gated"]
+    head = ["flight", "", "log-likelihood", "velocity RMSE", "sensor", "mean NIS", "lag-1", "gated"]
     rows = [head]
     for score in scores:
-        rmse = [m["axial_velocity_m_s"]["rmse"] for m in (score.before, score.after)]
+        rmse = [_velocity_rmse(m) for m in (score.before, score.after)]
         per = score.gain_nats / max(score.readings, 1.0)
         row = [score.flight, "held out" if score.held_out else "", f"{score.gain_nats:+.1f} ({per:+.3f} a reading)"]
         row.append(_pair(rmse, ".3f"))
@@ -78,6 +78,13 @@ def _scores(scores: Sequence[Score]) -> Iterator[str]:
         if row[0]:
             rows.append([*row, "", "", "", ""])
     yield from aligned(rows, left=(0, 1, 4))
+
+
+def _velocity_rmse(metrics: dict[str, Any]) -> float | None:
+    """Of the axial velocity; of the horizontal speed where there is only GPS."""
+    axial: float | None = metrics["axial_velocity_m_s"]["rmse"]
+    speed: float | None = metrics["horizontal_speed_rmse_m_s"]
+    return speed if axial is None else axial
 
 
 def _gated(sensor: dict[str, Any]) -> float | None:

@@ -10,7 +10,7 @@ import pytest
 
 from axialnav.fusion import complaints
 from axialnav.replay import cli, cli_replay
-from axialnav.replay.cli_output import progress_bar
+from axialnav.replay.cli_output import progress_bar, wrapped
 
 NOWHERE = "/nowhere/at/all"
 
@@ -143,3 +143,17 @@ def test_parameters_split_at_the_first_equals_sign(text: str, pair: tuple[str, s
 )
 def test_a_flight_name_becomes_a_harmless_folder_name(name: str, safe: str) -> None:
     assert cli_replay._file_name(name) == safe
+
+
+def test_a_narrow_terminal_wraps_between_words() -> None:
+    line = (
+        "flight     copter   80.0 s   imu0 3831 (47.9 Hz)   att0 767 (9.6 Hz)   flow0 761 (9.5 Hz)   tof0 509 (6.4 Hz)"
+    )
+    pieces = wrapped(line, 80).splitlines()
+    assert len(pieces) == 2
+    assert all(len(piece) <= 80 for piece in pieces)
+    assert pieces[1].startswith(" " * 11)
+    assert "".join(pieces).replace(" ", "") == line.replace(" ", "")
+    assert wrapped(line, 120) == line
+    path = "report     " + "x" * 100
+    assert "x" * 100 in wrapped(path, 80)  # what one copies is never cut

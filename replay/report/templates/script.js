@@ -5,8 +5,16 @@ const narrow = window.matchMedia("(max-width: 600px)");
 
 // Where the screen is narrow the buttons are always there, in a row of their own above the legend.
 const BAR_PX = 28;
+const LEGEND_ROW_PX = 20;
 
-function themed(layout) {
+// Room above a plot on a narrow screen: the buttons, and as many rows of the legend as its entries need.
+function room(figure) {
+  if (!narrow.matches) return 0;
+  const entries = figure.traces.filter((trace) => trace.name && trace.showlegend !== false).length;
+  return BAR_PX + LEGEND_ROW_PX * Math.max(0, Math.ceil(entries / 3) - 1);
+}
+
+function themed(layout, extra) {
   const style = getComputedStyle(document.documentElement);
   const ink = style.getPropertyValue("--ink").trim();
   const rule = style.getPropertyValue("--rule").trim();
@@ -19,7 +27,7 @@ function themed(layout) {
     font: { family: "system-ui, sans-serif", color: ink, size: narrow.matches ? 11 : 13 },
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
-    margin: { l: 50, r: 10, t: narrow.matches ? 30 + BAR_PX : 30, b: 45 },
+    margin: { l: 50, r: 10, t: 30 + extra, b: 45 },
     legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, itemsizing: "constant" },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: soft, activecolor: ink },
     hovermode: "closest",
@@ -37,8 +45,9 @@ let shared = null;
 
 function draw(element) {
   const figure = figures[Number(element.dataset.figure)];
-  const layout = themed(figure.layout);
-  if (narrow.matches) layout.height += BAR_PX;
+  const extra = room(figure);
+  const layout = themed(figure.layout, extra);
+  layout.height += extra;
   element.style.height = `${layout.height}px`;
   if (figure.time && shared) layout.xaxis = { ...layout.xaxis, range: [...shared] };
   const first = !element.data;
