@@ -28,6 +28,6 @@ def test_the_tools_are_timed(tmp_path: Path) -> None:
     assert float(replay[1]) > 0.0
     assert float(doctor[1]) > 0.0
     assert report[-1] == "ok"
-    one, two = sweep_rows(logs, tmp_path, count=2)
-    assert (one[1], two[1]) == ("1", "2")
-    assert float(one[2]) > 0.0
+    rows = list(sweep_rows(logs, tmp_path, count=2))
+    assert len(rows) == 3
+    assert all(float(row[2]) > 0.0 for row in rows)

@@ -122,3 +122,31 @@ def test_a_sweep_goes_on_and_names_what_it_could_not_read(
     told = capsys.readouterr()
     assert (code, told.err) == (3, "")
     assert sum(line.startswith("failed") for line in told.out.splitlines()) == 1
+
+
+@pytest.mark.parametrize("verb", ["doctor", "replay", "tune", "tune held out", "calibrate", "allan", "convert"])
+def test_every_verb_that_reads_a_log_reads_it_by_the_mapping(
+    verb: str, tmp_path: Path, material: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Told by what a mapping that asks for the impossible leads to."""
+    mapping = tmp_path / "mapping.toml"
+    mapping.write_text('[source.sonar0]\nfrom = ["RANGEFINDER"]\n', encoding="utf-8")
+    log = str(material / "log.tlog")
+    named = {"BAD": log, "GOOD": log, "OUT": str(tmp_path / "out")}
+    code = cli.main([*(named.get(word, word) for word in LOG_VERBS[verb]), "--mapping", str(mapping)])
+    assert code == 3
+    assert "[source.sonar0] has no [sensor.sonar0]" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_sweep_reads_its_logs_by_the_mapping(
+    tmp_path: Path, material: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mapping = tmp_path / "mapping.toml"
+    words = ["sweep", str(material / "log.tlog"), "--workers", "1", "--out", str(tmp_path / "out")]
+    for text, code in (("", 0), ('[source.sonar0]\nfrom = ["RANGEFINDER"]\n', 3)):
+        mapping.write_text(text, encoding="utf-8")
+        assert (
+            cli.main([*words, "--mapping", str(mapping)]) == code
+        )  # another mapping is another job: not taken as done
+    assert "[source.sonar0] has no [sensor.sonar0]" in capsys.readouterr().out

@@ -103,7 +103,7 @@ def test_each_section_has_its_line() -> None:
 
 
 def test_columns_line_up() -> None:
-    assert list(aligned([["a", "1"], ["long", "234"]])) == ["a        1", "long   234"]
+    assert list(aligned([["a", "1"], ["long", "234"]])) == ["a       1", "long  234"]
 
 
 @pytest.mark.parametrize(("nees", "word"), [(3.0, "consistent"), (9.0, "overconfident"), (0.5, "pessimistic")])
