@@ -40,8 +40,8 @@ def tune(
     out
         TOML file to write.
     free
-        Settings to tune, separated by commas, e.g. uwb.sigma_m,delay.late_s.uwb0,sensor.uwb0.lever_x_m; the noise of
-        all sensors that were read if not given.
+        Settings to tune, separated by commas, e.g. uwb.sigma_m,delay.late_s.uwb0,sensor.uwb0.lever_x_m; if not given,
+        the noise of the accelerometer and of all sensors that were read, but not of barometers and attitudes.
     config
         TOML file with settings to start from.
     hold_out

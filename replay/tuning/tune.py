@@ -93,7 +93,8 @@ def tune(
     config
         Settings to start from; what it leaves open comes from each flight.
     free
-        Dotted names of the settings to change; the noise of all sensors that were read if empty.
+        Dotted names of the settings to change; if empty, those of
+        :func:`~axialnav.replay.tuning.parameters.default_names`.
     hold_out
         Recordings that are only scored, before and after.
     workers
