@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 from typing import Any
 
 from axialnav.fusion.config import Config
@@ -31,7 +32,11 @@ def _scores(job: Job) -> dict[str, Any]:
 
     config = None if job.config is None else Config.from_dict(parse(job.config, where="--config"), where="--config")
     run = replay(
-        _flight(job.log, job.mapping), config, without=job.without, params=dict(job.params), estimator=job.estimator
+        _flight(job.log, job.mapping, _changed_ns(job.log), _changed_ns(job.mapping)),
+        config,
+        without=job.without,
+        params=dict(job.params),
+        estimator=job.estimator,
     )
     metrics = run.metrics
     axial = {f"axial_{key}": value for key, value in metrics["axial_velocity_m_s"].items()}
@@ -56,6 +61,11 @@ def _scores(job: Job) -> dict[str, Any]:
 
 
 @functools.lru_cache(KEPT_FLIGHTS)
-def _flight(log: str, mapping: str | None) -> Flight:
-    """A recording stays in memory while its settings are varied; neighbouring jobs share it."""
+def _flight(log: str, mapping: str | None, *_: int) -> Flight:
+    """A recording stays in memory while its settings are varied and its files stay as they are."""
     return load_flight(log, mapping=mapping)
+
+
+def _changed_ns(path: str | None) -> int:
+    """When a file was changed [ns]: workers of a cluster live longer than a file may stay as it is."""
+    return Path(path).stat().st_mtime_ns if path is not None and Path(path).exists() else 0

@@ -20,7 +20,7 @@ from axialnav.replay.flight_writer import write_flight
 from axialnav.replay.tuning.cost import Subject
 from tests.replay.made_recordings import flown
 
-LATE_S, LONG_M, FOCAL = 0.35, 0.03, 1.04
+LATE_S, FLOW_LATE_S, LONG_M, FOCAL = 0.35, 0.06, 0.03, 1.04
 
 
 def late_uwb(flight: Flight) -> Flight:
@@ -58,6 +58,22 @@ def test_late_stamps_are_found_within_20_ms() -> None:
     assert late["uwb0"].late_s == pytest.approx(LATE_S, abs=0.02)
     assert late["uwb0"].gain_nats > 100.0
     assert abs(late["flow0"].late_s) < 0.02
+
+
+@pytest.mark.slow
+def test_two_delays_are_found_behind_reflections_and_other_faults() -> None:
+    """UWB 0.35 s and image motion 0.06 s late, 8 % of the ranges 3 m too long, lens and range finder wrong."""
+    flight = wrong(late_uwb(flown(2, 40.0, outlier_share=0.08)))
+    flow = flight.tables["flow0"]
+    late_flow = dataclasses.replace(flow, t_ns=flow.t_ns + round(FLOW_LATE_S * 1e9))
+    flight = dataclasses.replace(flight, tables={**flight.tables, "flow0": late_flow})
+    delays = find_delays(Subject("late", flight.config, Rehearsal(flight.config, flight.tables)), 1)
+    late = {delay.sensor: delay for delay in delays}
+    assert late["uwb0"].late_s == pytest.approx(LATE_S, abs=0.02)
+    assert late["flow0"].late_s == pytest.approx(FLOW_LATE_S, abs=0.02)
+    assert late["range0"].gain_nats == 0.0  # was right and stays where it was
+    for found in late.values():
+        assert found.sigma_s is None or 0.0005 < found.sigma_s < 0.1
 
 
 @pytest.mark.slow

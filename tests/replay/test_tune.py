@@ -14,6 +14,7 @@ from axialnav.replay import cli
 from axialnav.replay.flight_writer import write_flight
 from axialnav.replay.run import replay
 from axialnav.replay.tuning.cost import Cost, Subject
+from axialnav.replay.tuning.evidence import collect, counts_of
 from axialnav.replay.tuning.optimise import describe, standard_errors
 from axialnav.replay.tuning.parameters import apply, default_names, parameter, read
 from axialnav.replay.tuning.scoring import Expansion, minimise
@@ -182,3 +183,35 @@ def test_wrong_use_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     ):
         assert cli.main(["tune", *arguments]) == code, arguments
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_evidence_stands_in_the_same_place_whatever_the_delay() -> None:
+    """A shift moves a sensor's readings past those of others; each is still compared with itself."""
+    flight = flown(5, 6.0)
+    rehearsal = Rehearsal(flight.config, flight.tables)
+    trials = [rehearsal.run(apply(flight.config, {"delay.late_s.uwb0": late})) for late in (0.0, 0.123)]
+    assert not np.array_equal(*(trial.log.source for trial in trials))
+    counts = counts_of(trials[0])
+    here, shifted = (collect(trial, counts) for trial in trials)
+    logs = [trial.log for trial in trials]
+    for number in range(len(logs[0].sensors)):
+        first = int(counts[:number].sum())
+        mine = slice(first, first + int(counts[number]))
+        for evidence, log in zip((here, shifted), logs, strict=True):
+            np.testing.assert_array_equal(evidence.innovation[mine], log.innovation[log.source == number])
+    margin = collect(trials[0], counts, 1.0)
+    assert 0 < margin.terms.used.sum() < 0.75 * here.terms.used.sum()  # two of six seconds are left out
+
+
+def test_the_expected_curvature_is_that_of_the_cost_where_the_noise_is_told_right() -> None:
+    """Fisher's information against second differences of the same cost, for the noise of UWB and image motion."""
+    flight = flown(6, 20.0, shake=False)
+    parameters = [parameter(flight.config, name) for name in NAMES[2:]]
+    cost = Cost([Subject("x", flight.config, Rehearsal(flight.config, flight.tables))], parameters, 1)
+    here, step = np.zeros(2), 0.1
+    cost.refer_to(here)
+    expected = np.diag(cost.expand(here).curvature)
+    for i in range(2):
+        ends = cost([here, here - step * np.eye(2)[i], here + step * np.eye(2)[i]])
+        second = (ends[1] + ends[2] - 2.0 * ends[0]) / step**2
+        assert expected[i] == pytest.approx(second, rel=0.25)
