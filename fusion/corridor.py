@@ -39,6 +39,7 @@ from axialnav.models.state import (
 
 Array = NDArray[np.float64]
 LOG_ROW = struct.Struct(f"{LOG_WIDTH}d")  # all of a row at once: quicker than its numbers one by one
+HELD_S = 60.0  # how long readings wait for a first state
 FUSED = (Verdict.FUSED, Reason.NONE)
 # by the reason that the supervisor gave; where it gave none, the gate refused
 REFUSED = tuple((verdict_of(r), r) for r in (Reason(code or Reason.INNOVATION) for code in range(len(Reason))))
@@ -68,7 +69,8 @@ class CorridorEstimator:
     Notes
     -----
     Until ``start.window_s`` of inertial samples have come, readings are held; then the first state is found and they
-    are processed in order.  A reading that comes late is fused at its own stamp as long as it is within
+    are processed in order.  Without inertial samples that never comes: what has waited for a minute longer than that is
+    dropped and counted.  A reading that comes late is fused at its own stamp as long as it is within
     ``delay.buffer_s`` of the newest; its older fellows are counted in :attr:`late` and dropped.
     """
 
@@ -120,6 +122,7 @@ class CorridorEstimator:
             self.late[reading.sensor] += 1
             return self._record(reading, Reason.TOO_OLD)
         if code == HELD and not self._start():
+            self._drop_stale()
             return self._record(reading, Reason.ALIGNING)
         return Outcome(reading.t_ns, reading.sensor) if kind is ImuSample else self._record_update(reading)
 
@@ -168,6 +171,13 @@ class CorridorEstimator:
             return False
         self._stream.restart(*found)
         return True
+
+    def _drop_stale(self) -> None:
+        """Drop what has waited too long for a first state, so that a stream without one does not fill the memory."""
+        ring = self._stream.ring
+        limit = int(ring.events.t_ns[-1]) - round((HELD_S + self.config.start.window_s) * 1e9)
+        if ring.t_ns[0] < limit:
+            self.late.update(self._names[source] for source in ring.drop_before(limit).tolist())
 
     def _align(self, held: Events) -> tuple[Memory, int] | None:
         """First state and end of the first window, once inertial samples span it."""

@@ -72,6 +72,16 @@ class Ring(NamedTuple):
         self.free[:] = np.arange(len(self.free))
         self.head["free"] = len(self.free)
 
+    def drop_before(self, t_ns: int) -> Ints:
+        """Drop the events before ``t_ns`` of a filter without a state; return their sources."""
+        n = int(self.head["count"][0])
+        cut = int(np.searchsorted(self.t_ns[:n], t_ns))
+        dropped = self.source[:cut].copy()
+        for column in (self.t_ns, self.source, self.values, self.slot):
+            column[: n - cut] = column[cut:n].copy()
+        self.head["count"] = n - cut
+        return dropped
+
     def grown(self) -> Ring:
         """Copy with twice the room."""
         larger = _allocate(2 * len(self.t_ns), self.memory)

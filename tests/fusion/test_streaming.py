@@ -223,3 +223,22 @@ def test_flags_say_so_when_no_aid_comes() -> None:
     late = estimator.state(now.t_ns + 6_000_000_000)
     assert late.dead_reckoning
     assert not late.velocity_valid
+
+
+def test_readings_that_wait_for_inertial_samples_in_vain_are_dropped_and_counted() -> None:
+    """Three minutes of UWB and nothing else: the filter holds the last minute, and starts once samples come."""
+    made = fly(Scene(duration_s=3.0, sensors=("uwb0",)))
+    estimator = CorridorEstimator(made.config)
+    begin = made.tables["imu0"].t_ns[0]
+    waiting = [
+        UwbRange(t_ns=int(begin) - (180 - k) * 1_000_000_000, sensor="uwb0", anchor="a0", range_m=5.0)
+        for k in range(180)
+    ]
+    assert {estimator.push(reading).reason for reading in waiting} == {Reason.ALIGNING}
+    held = int(estimator._stream.ring.head["count"][0])
+    assert held + estimator.late["uwb0"] == 180
+    assert 60 <= held <= 63
+    imu = made.tables["imu0"]
+    for t_ns, gyro, accel in zip(imu.t_ns, imu.columns["gyro_rad_s"], imu.columns["accel_m_s2"], strict=True):
+        estimator.push(ImuSample(t_ns=int(t_ns), sensor="imu0", gyro_rad_s=tuple(gyro), accel_m_s2=tuple(accel)))
+    assert estimator.state().t_ns == imu.t_ns[-1]
