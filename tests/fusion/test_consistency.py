@@ -21,7 +21,7 @@ from axialnav.fusion.batch import run_batch
 from tests.fusion.inside import memories
 from tests.fusion.made_flights import MadeFlight, Scene, Table, fly, textbook
 
-FLIGHTS = 60
+FLIGHTS = 100
 BAND = (0.025 / 24, 1.0 - 0.025 / 24)
 BLOCKS = {
     "position": slice(0, 3),
@@ -134,6 +134,29 @@ def test_innovations_of_every_source_are_as_large_as_predicted(rig: str) -> None
     for name, (nis, dof) in innovations(rig).items():
         assert dof > 5000
         assert nis / dof == pytest.approx(1.0, abs=0.03), name
+
+
+@functools.cache
+def lag_one(rig: str) -> dict[str, tuple[float, int]]:
+    """Correlation of neighbouring normalised innovations of the first axis by sensor, and how many pairs there are."""
+    total: dict[str, tuple[float, float, int]] = {}
+    for seed in range(20):
+        flight = flown(rig, seed)
+        log = run_batch(flight.config, flight.tables).log
+        for index, name in enumerate(log.sensors):
+            mine = (log.source == index) & (log.t_ns > flight.tables["imu0"].t_ns[0] + 5_000_000_000) & (log.dof > 0)
+            y = log.innovation[mine, 0] / np.sqrt(log.variance[mine, 0])
+            product, square, pairs = total.get(name, (0.0, 0.0, 0))
+            total[name] = (product + float(y[1:] @ y[:-1]), square + float(y @ y), pairs + max(len(y) - 1, 0))
+    return {name: (product / square, pairs) for name, (product, square, pairs) in total.items() if pairs}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rig", RIGS)
+def test_innovations_of_every_source_are_white(rig: str) -> None:
+    """Neighbours are uncorrelated within four sigma, and within 0.03 where there are very many."""
+    for name, (correlation, pairs) in lag_one(rig).items():
+        assert abs(correlation) < max(4.0 / np.sqrt(pairs), 0.03), name
 
 
 @pytest.mark.slow
