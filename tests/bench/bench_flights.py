@@ -24,7 +24,7 @@ from tests.bench.wrong_uwb import wrong_uwb_tables
 
 HEAD = (
     "flight", "axial velocity asked", "measured [m/s]", "position asked [m]", "x y z [m]", "3-D [m]", "farthest [m]",
-    "NEES (95 % band)", "accelerometer fault", "resets", "verdict",
+    "in 3 sigma", "sigma / RMSE", "NEES (95 % band)", "accelerometer fault", "resets", "verdict",
 )  # fmt: skip
 
 
@@ -97,11 +97,19 @@ def result_row(result: Result) -> list[str]:
         " ".join(number(a) for a in axes) if axes else "-",
         number(metrics["position_rmse_3d_m"]),
         number(result.farthest_m),
+        *_coverage(metrics["axial_velocity_m_s"]),
         _nees(metrics),
         f"{100 * metrics['health'].get('accelerometer_fault', 0.0):.0f} %",
         str(metrics["resets"]),
         f"SHORT: {', '.join(missed)}" if missed else "ok",
     ]
+
+
+def _coverage(axial: Mapping[str, Any]) -> tuple[str, str]:
+    """Share of the axial velocity inside three sigma, and the mean sigma beside the error."""
+    if axial["rmse"] is None:
+        return "-", "-"
+    return f"{100 * axial['in_3_sigma']:.1f} %", f"{axial['mean_sigma'] / axial['rmse']:.2f}"
 
 
 def _nees(metrics: Mapping[str, Any]) -> str:

@@ -24,7 +24,7 @@ def cells(text: str, start: str) -> list[list[str]]:
 def test_the_flight_tables_show_a_limit_that_is_kept_and_one_that_is_not() -> None:
     cases = (Case(SAMPLE.name, speed_m_s=0.5), Case(SAMPLE.name, ("tof0",), speed_m_s=1e-6))
     text = tables(cases, SAMPLE.parent, {"default": DEFAULT, "plain": PLAIN})
-    kept, missed = (row for row in cells(text, SAMPLE.name) if len(row) == 11)
+    kept, missed = (row for row in cells(text, SAMPLE.name) if len(row) == 13)
     assert kept[-1] == "ok"
     assert missed[0] == f"{SAMPLE.name} without tof0"
     assert missed[-1] == "SHORT: speed"
