@@ -15,10 +15,10 @@ from axialnav.estimators.search import STEP_PX, LagTransform, search_weight, unr
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
 
 Plane = NDArray[np.float32]
-COLUMNS = 40
+COLUMNS = 32
 REACH_PX = 24.0
 MANY_FRAMES = 5
-TALL_PX = 512  # taller pictures are read every second (third, ...) row: that is sharp enough
+TALL_PX = 400  # taller pictures are read every second (third, ...) row: that is sharp enough
 MIN_SIGNIFICANCE = 6.0
 
 
@@ -43,7 +43,7 @@ class DriftMeter:
 
     def __init__(self, height: int, width: int, frames: int) -> None:
         self._count = min(COLUMNS, width // SUMMED_COLUMNS)
-        self._stride = max(1, height // TALL_PX)
+        self._stride = max(1, round(height / TALL_PX))
         height //= self._stride
         self.band = Band(fast_length(height))
         self._every = np.arange(self._count)

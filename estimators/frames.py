@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
 from axialnav.estimators.result import MotionReason
+from axialnav.models.jit import kernel
 
 Image = NDArray[np.unsignedinteger[Any]]
 Frames = NDArray[np.generic] | Sequence[NDArray[np.generic]]
@@ -96,15 +97,30 @@ def unusable(image: Image) -> str:
 
     A sensor of any depth saturates at a number of the form 2^n - 1.
     """
-    probe = image[::PROBE, ::PROBE]
-    top = int(probe.max())
+    low, top, full = _probe(image)
     if top <= DARK_DN and int(image.max()) <= DARK_DN:
         return MotionReason.DARK
-    if top >= FULL_DN and top & (top + 1) == 0 and float(np.mean(probe == top)) > MAX_SATURATED:
+    if top >= FULL_DN and top & (top + 1) == 0 and full > MAX_SATURATED:
         return MotionReason.SATURATED
-    if int(probe.min()) == top and int(image.min()) == int(image.max()):
+    if low == top and int(image.min()) == int(image.max()):
         return MotionReason.NO_TEXTURE
     return ""
+
+
+@kernel
+def _probe(image: Image) -> tuple[int, int, float]:
+    """Least and largest number among the probed pixels, and the share of the largest."""
+    low, top, full, count = int(image[0, 0]), 0, 0, 0
+    for r in range(0, image.shape[0], PROBE):
+        line = image[r]
+        for c in range(0, image.shape[1], PROBE):
+            value = int(line[c])
+            low = min(low, value)
+            if value > top:
+                top, full = value, 0
+            full += value == top
+            count += 1
+    return low, top, full / count
 
 
 def same_picture(first: Image, second: Image) -> bool:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from axialnav.estimators.positions import climb, coherent_power, motion_basis, position_scores
 from axialnav.estimators.products import Products
 from axialnav.estimators.spectrum import pair_count
-from axialnav.estimators.texture import blur_power, group_starts, matched_weight, shape_family, smooth_spectra
+from axialnav.estimators.texture import blur_power, matched_weight, sharp_family, smooth_spectra
 
 Array = NDArray[np.float64]
 LIMITS = np.array([0.3, 1e-4, 4.0])  # longest Newton step and the one that ends the climb [px], number of steps
@@ -62,10 +62,11 @@ class Fit:
 def spectra_at(products: Products, position_px: Array, blur_px: float) -> Array:
     """Smooth texture, smooth noise and raw coherent power per row and frame at these positions, shape (3, c, f)."""
     band, sums = products.band, products.total
-    shapes = shape_family(band.first, band.count, band.length) * blur_power(blur_px, band.frequency())
-    pairs, out = np.empty(sums.power.shape), np.empty((3, *sums.power.shape))
+    shapes, family, starts = sharp_family(band.first, band.count, band.length)
+    pairs, out = np.empty(sums.power.shape, dtype=np.float32), np.empty((3, *sums.power.shape))
     coherent_power(sums.re, sums.im, band.omega(), position_px, pairs)
-    smooth_spectra(sums.power, pairs, sums.rows, products.frames, shapes, group_starts(band.count), out)
+    blur = blur_power(blur_px, band.frequency())
+    smooth_spectra(sums.power, pairs, sums.rows, products.frames, shapes, family, starts, blur, out)
     return out
 
 
@@ -107,7 +108,8 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
             return None
     score, information, coherence = evaluate(products, weight, basis @ motion - products.offset_px)
     J = basis.T @ information.sum(axis=0) @ basis
-    if not (np.all(np.isfinite(J)) and float(np.linalg.eigvalsh(J)[0]) > 0.0):
+    determinant = J[0, 0] if len(J) == 1 else J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+    if not (0.0 < J[0, 0] < np.inf and 0.0 < determinant < np.inf):
         return None
     covariance = sandwich(score @ basis, J)
     return Fit(motion, covariance, score, information, coherence, texture, noise, weight, coherent)
@@ -141,9 +143,10 @@ def sandwich(score: Array, J: Array) -> Array:
 def best_bend(products: Products, fit: Fit) -> float:
     """Change of the displacement per frame [px] from a coarse look around a fit without one."""
     basis, sums, omega = motion_basis(products.frames, True), products.total, products.band.omega()
-    pairs = np.empty(sums.power.shape)
+    pairs = np.empty(sums.power.shape, dtype=np.float32)
 
     def gain(bend: float) -> float:
+        """Log-likelihood of a bend, less that of unrelated frames."""
         position = basis @ np.array([fit.motion[0], bend]) - products.offset_px
         coherent_power(sums.re, sums.im, omega, position, pairs)
         return float(np.sum(fit.weight * pairs))

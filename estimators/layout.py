@@ -79,7 +79,7 @@ class RowLayout:
                     self.place[source : source + many] = np.arange(target, target + many)
         ends = self.edges[1:].reshape(STRIPS, self.classes)
         firsts = self.edges[:-1].reshape(STRIPS, self.classes)
-        coarse = min(COARSE_CLASSES, self.classes)
+        coarse = min(COARSE_CLASSES, max(1, self.levels))
         self.smooth = np.stack([firsts[:, 0], ends[:, 0]], axis=1)
         paired = [
             [np.arange(firsts[s, c], ends[s, c]) for s in (2 * band, 2 * band + 1)]

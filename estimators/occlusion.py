@@ -54,6 +54,8 @@ def _cell_powers(
     seen[:] = np.float32(0.0)
     for k in range(order.shape[0]):
         seen[max(0, -shift[k]) : min(width, width - shift[k])] += np.float32(1.0)
+    for c in range(width):
+        seen[c] = np.float32(1.0) / max(seen[c], np.float32(1.0))
     for s in range(edges.shape[0] - 1):
         if not wanted[s]:
             continue
@@ -71,11 +73,18 @@ def _cell_powers(
                     _add(line, total[low:high])
                 k += 1
             _add_square(total, column)
+        _multiply(seen, column)
         for b in range(out.shape[1]):
             power = np.float32(0.0)
             for c in range(b * CELL_PX, (b + 1) * CELL_PX):
-                power += column[c] / max(seen[c], np.float32(1.0))
+                power += column[c]
             out[s, b] = power
+
+
+@kernel
+def _multiply(factor: Plane, line: Plane) -> None:
+    for c in range(line.shape[0]):
+        line[c] *= factor[c]
 
 
 @kernel

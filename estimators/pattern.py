@@ -37,10 +37,10 @@ def pattern_power(products: Products, fit: Fit) -> tuple[float, float]:
     frames, sums, omega = products.frames, products.total, products.band.omega()
     wall = motion_basis(frames, len(fit.motion) == 2) @ fit.motion
     many = pair_count(frames)
-    at_camera, at_wall = np.empty((2, *sums.power.shape))
+    at_camera, at_wall = np.empty((2, *sums.power.shape), dtype=np.float32)
     coherent_power(sums.re, sums.im, omega, -products.offset_px, at_camera)
     coherent_power(sums.re, sums.im, omega, wall - products.offset_px, at_wall)
-    cosine, sine = np.empty((2, frames, len(omega)))
+    cosine, sine = np.empty((2, frames, len(omega)), dtype=np.float32)
     turns(omega, wall, cosine, sine)
     alike = 0.5 * (cosine.sum(axis=0) ** 2 + sine.sum(axis=0) ** 2 - frames)
     apart = np.maximum(many - alike**2 / many, 1e-6)

@@ -24,7 +24,7 @@ Plane = NDArray[np.float32]
 
 
 @kernel
-def turns(omega: Array, position: Array, cosine: Array, sine: Array) -> None:
+def turns(omega: Array, position: Array, cosine: Plane, sine: Plane) -> None:
     """``exp(i w x_k)`` of all frames, shapes (n, f), by repeated turns: ``omega`` (f,) is evenly spaced."""
     count = omega.shape[0]
     step = omega[1] - omega[0]
@@ -38,7 +38,7 @@ def turns(omega: Array, position: Array, cosine: Array, sine: Array) -> None:
 
 
 @kernel
-def _relative(cosine: Array, sine: Array, i: int, j: int, c: Array, d: Array) -> None:
+def _relative(cosine: Plane, sine: Plane, i: int, j: int, c: Plane, d: Plane) -> None:
     """``exp(i w (x_i - x_j))`` for every frequency."""
     a, b, x, y = cosine[i], sine[i], cosine[j], sine[j]
     for f in range(c.shape[0]):
@@ -47,28 +47,32 @@ def _relative(cosine: Array, sine: Array, i: int, j: int, c: Array, d: Array) ->
 
 
 @kernel
-def _moments(re: Plane, im: Plane, c: Array, d: Array, omega: Array) -> tuple[float, float, float]:
-    """``sum Re E``, ``-sum w Im E`` and ``sum w^2 Re E`` of one pair.
-
-    Two halves at a time: the processor adds faster than one sum after the other allows.
-    """
-    half = omega.shape[0] // 2
-    sum_a, slope_a, bend_a, sum_b, slope_b, bend_b = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for f in range(half):
-        g = f + half
-        real_a, real_b = re[f] * c[f] - im[f] * d[f], re[g] * c[g] - im[g] * d[g]
-        sum_a += real_a
-        sum_b += real_b
-        slope_a -= omega[f] * (re[f] * d[f] + im[f] * c[f])
-        slope_b -= omega[g] * (re[g] * d[g] + im[g] * c[g])
-        bend_a += omega[f] * omega[f] * real_a
-        bend_b += omega[g] * omega[g] * real_b
-    for f in range(2 * half, omega.shape[0]):
+def _moments(re: Plane, im: Plane, c: Plane, d: Plane, omega: Plane, parts: Plane) -> None:
+    """``sum Re E``, ``-sum w Im E`` and ``sum w^2 Re E`` of one pair into the first column of ``parts`` (3, f)."""
+    total, slope, bend = parts[0], parts[1], parts[2]
+    for f in range(omega.shape[0]):
         real = re[f] * c[f] - im[f] * d[f]
-        sum_a += real
-        slope_a -= omega[f] * (re[f] * d[f] + im[f] * c[f])
-        bend_a += omega[f] * omega[f] * real
-    return sum_a + sum_b, slope_a + slope_b, bend_a + bend_b
+        total[f] = real
+        slope[f] = -omega[f] * (re[f] * d[f] + im[f] * c[f])
+        bend[f] = omega[f] * omega[f] * real
+    for part in range(3):
+        _fold(parts[part])
+
+
+@kernel
+def _fold(values: Plane) -> None:
+    """Sum of ``values`` (f,) into the first of them, halves upon halves: fast, and exact to a few units in the last."""
+    length = values.shape[0]
+    while length > 1:
+        kept = (length + 1) // 2
+        _add(values[kept:length], values[: length - kept])
+        length = kept
+
+
+@kernel
+def _add(values: Plane, total: Plane) -> None:
+    for f in range(values.shape[0]):
+        total[f] += values[f]
 
 
 @kernel
@@ -89,10 +93,11 @@ def position_scores(
     """
     strips, classes, _, count = re.shape
     frames = position.shape[0]
-    cosine, sine = np.empty((frames, count)), np.empty((frames, count))
+    cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
     turns(omega, position, cosine, sine)
-    c, d = np.empty(count), np.empty(count)
+    c, d = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
     sum_re, sum_im = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    parts, narrow = np.empty((3, count), dtype=np.float32), omega.astype(np.float32)
     score[:] = 0.0
     information[:] = 0.0
     p = 0
@@ -105,7 +110,8 @@ def position_scores(
                 for k in range(classes):
                     _add_weighted(re[s, k, p], weight[k], sum_re)
                     _add_weighted(im[s, k, p], weight[k], sum_im)
-                coherence[s, p], slope, bend = _moments(sum_re, sum_im, c, d, omega)
+                _moments(sum_re, sum_im, c, d, narrow, parts)
+                coherence[s, p], slope, bend = parts[0, 0], np.float64(parts[1, 0]), np.float64(parts[2, 0])
                 score[s, i] += 2.0 * slope
                 score[s, j] -= 2.0 * slope
                 information[s, i, j] -= 2.0 * bend
@@ -222,13 +228,13 @@ def free_positions(frames: int, fitted: int) -> Array:
 
 
 @kernel
-def coherent_power(re: Plane, im: Plane, omega: Array, position: Array, out: Array) -> None:
+def coherent_power(re: Plane, im: Plane, omega: Array, position: Array, out: Plane) -> None:
     """Sum ``Re E_ij`` over all pairs for every frequency: products (c, p, f) to ``out`` (c, f)."""
     frames, count = position.shape[0], omega.shape[0]
-    cosine, sine = np.empty((frames, count)), np.empty((frames, count))
+    cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
     turns(omega, position, cosine, sine)
-    c, d = np.empty(count), np.empty(count)
-    out[:] = 0.0
+    c, d = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    out[:] = np.float32(0.0)
     p = 0
     for i in range(frames):
         for j in range(i + 1, frames):
@@ -239,6 +245,6 @@ def coherent_power(re: Plane, im: Plane, omega: Array, position: Array, out: Arr
 
 
 @kernel
-def _add_real(re: Plane, im: Plane, c: Array, d: Array, out: Array) -> None:
+def _add_real(re: Plane, im: Plane, c: Plane, d: Plane, out: Plane) -> None:
     for f in range(out.shape[0]):
         out[f] += re[f] * c[f] - im[f] * d[f]

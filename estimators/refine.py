@@ -17,6 +17,7 @@ from axialnav.estimators.window import FrameWindow
 Mask = NDArray[np.bool_]
 MAX_ROLL_STEPS = 4
 DRIFT_SHARE = 1.0  # of a bin: drift over the whole window that is worth following
+FAST_DRIFT_PX = 12.0  # per frame: faster than anything that flies beside a wall; bins that hide it need no look
 UNMOVED = Drift(0.0, False)
 
 
@@ -25,18 +26,24 @@ def follow(window: FrameWindow, start_px: float, strips: Mask, exposure_ratio: f
 
     A drift with which the strips agree less is that of something else (a slanting cable, say) and is not followed.
     """
-    drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
-    if abs(drift.cross_px) * (len(window.order) - 1) < DRIFT_SHARE * window.bin_height:
-        return drift, window.following(start_px).selected(strips)
+    harmless_px = DRIFT_SHARE * window.bin_height / (len(window.order) - 1)
+    drift = UNMOVED
+    if harmless_px < FAST_DRIFT_PX:
+        drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
+    products = window.following(start_px).selected(strips)
+    if abs(drift.cross_px) < harmless_px:
+        return drift, products
+    still = _spread(products, start_px, exposure_ratio)
+    products = window.following(start_px, drift.cross_px).selected(strips)
+    if _spread(products, start_px, exposure_ratio) < still:
+        return drift, products
+    return UNMOVED, window.following(start_px).selected(strips)
 
-    def spread(cross_px: float) -> float:
-        products = window.following(start_px, cross_px).selected(strips)
-        fit = fit_motion(products, np.array([start_px]), exposure_ratio, passes=1)
-        return float(fit.covariance[0, 0]) if fit is not None else np.inf
 
-    if spread(0.0) <= spread(drift.cross_px):
-        drift = UNMOVED
-    return drift, window.following(start_px, drift.cross_px).selected(strips)
+def _spread(products: Products, start_px: float, exposure_ratio: float) -> float:
+    """Variance of the displacement [px^2] as the strips show it; infinite if there is no fit."""
+    fit = fit_motion(products, np.array([start_px]), exposure_ratio, passes=1)
+    return float(fit.covariance[0, 0]) if fit is not None else np.inf
 
 
 def fit_strips(products: Products, start_px: float, exposure_ratio: float, consensus: bool) -> tuple[Fit | None, int]:
@@ -53,7 +60,7 @@ def fit_strips(products: Products, start_px: float, exposure_ratio: float, conse
     consensus
         Whether strips may be left out.
     """
-    fit = fit_frames(products, start_px, exposure_ratio)
+    fit = fit_frames(products, start_px, exposure_ratio, passes=2)
     lost = 0
     for doubt in (disturbed, _no_roll) if consensus else ():
         bad = doubt(fit, products) if fit is not None else np.zeros(0, dtype=np.bool_)
@@ -104,9 +111,9 @@ def _unpatterned(products: Products, fit: Fit | None, exposure_ratio: float) -> 
     return products, fit_frames(products, float(fit.motion[0]), exposure_ratio)
 
 
-def fit_frames(products: Products, start_px: float, exposure_ratio: float) -> Fit | None:
+def fit_frames(products: Products, start_px: float, exposure_ratio: float, passes: int = 1) -> Fit | None:
     """Displacement alone, then with an acceleration if that is significant."""
-    fit = fit_motion(products, np.array([start_px]), exposure_ratio)
+    fit = fit_motion(products, np.array([start_px]), exposure_ratio, passes)
     if fit is None or bend_significance(fit) < SURE_BEND:
         return fit
     start = np.array([float(fit.motion[0]), best_bend(products, fit)])

@@ -17,13 +17,19 @@ from axialnav.models.jit import kernel
 
 Plane = NDArray[np.float32]
 Index = NDArray[np.int64]
-BUDGET = 270_000  # binned pixels per frame: what a millisecond or two of one core can chew
+BUDGET = 270_000  # binned pixels per frame, at most
+PLENTY, LEAST_BINS = 326_000, 64  # pixels from which bins grow faster than pictures; rows that must be left
 SUMMED_COLUMNS = 8
 
 
 def bin_height(height: int, width: int) -> int:
-    """Rows summed into one bin, so that a binned frame stays within the budget."""
-    return max(1, math.ceil(height * width / BUDGET))
+    """Rows summed into one bin.
+
+    Small pictures need every pixel.  Large ones have pixels to spare: their bins grow faster than the pictures do, so
+    that a larger picture takes less time, not more, and still gives the smaller sigma.
+    """
+    pixels = float(height * width)
+    return max(math.ceil(pixels / BUDGET), min(round(math.pow(pixels / PLENTY, 1.5)), height // LEAST_BINS))
 
 
 def row_sums(width: int, height: int, dtype: np.dtype[Any]) -> NDArray[Any]:

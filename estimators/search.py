@@ -43,7 +43,7 @@ class Profiles:
 
     def total(self, bands: NDArray[np.bool_]) -> Array:
         """Sum over some bands, shape (d,)."""
-        return np.asarray(self.gain[bands].sum(axis=0))
+        return np.asarray(bands.astype(np.float64) @ self.gain)
 
     def near(self, index: int, reach_px: float) -> slice:
         """Grid points within ``reach_px`` of a grid point."""

@@ -98,8 +98,29 @@ def pair_products(
     out_re[:] = np.float32(0.0)
     out_im[:] = np.float32(0.0)
     for g in range(edges.shape[0] - 1):
-        for r in range(edges[g], edges[g + 1]):
-            _add_product(re_i[r], im_i[r], re_j[r], im_j[r], out_re[g], out_im[g])
+        _add_products(re_i, im_i, re_j, im_j, edges[g], edges[g + 1], out_re[g], out_im[g])
+
+
+@kernel
+def _add_products(
+    re_i: Plane, im_i: Plane, re_j: Plane, im_j: Plane, first: int, end: int, out_re: Plane, out_im: Plane
+) -> None:
+    """Add the products of the rows from ``first`` to ``end``, two at a time: that saves half of the sums' traffic."""
+    r = first
+    while r + 1 < end:
+        _add_two(re_i[r], im_i[r], re_j[r], im_j[r], re_i[r + 1], im_i[r + 1], re_j[r + 1], im_j[r + 1], out_re, out_im)
+        r += 2
+    if r < end:
+        _add_product(re_i[r], im_i[r], re_j[r], im_j[r], out_re, out_im)
+
+
+@kernel
+def _add_two(
+    a: Plane, b: Plane, c: Plane, d: Plane, p: Plane, q: Plane, u: Plane, v: Plane, out_re: Plane, out_im: Plane
+) -> None:
+    for f in range(a.shape[0]):
+        out_re[f] += a[f] * c[f] + b[f] * d[f] + (p[f] * u[f] + q[f] * v[f])
+        out_im[f] += b[f] * c[f] - a[f] * d[f] + (q[f] * u[f] - p[f] * v[f])
 
 
 @kernel
@@ -120,8 +141,7 @@ def all_pair_products(re: Plane, im: Plane, edges: NDArray[np.int64], out_re: Pl
         p = 0
         for i in range(frames):
             for j in range(i + 1, frames):
-                for r in range(edges[g], edges[g + 1]):
-                    _add_product(re[i, r], im[i, r], re[j, r], im[j, r], out_re[g, p], out_im[g, p])
+                _add_products(re[i], im[i], re[j], im[j], edges[g], edges[g + 1], out_re[g, p], out_im[g, p])
                 p += 1
 
 

@@ -146,9 +146,10 @@ class MotionEstimator:
                 self._window = FrameWindow(grey.shape[0], grey.shape[1], self._frames, grey.dtype)
             window = self._window
             self._check_size(grey, window.images[0])
-            repeated = window.order and same_picture(window.images[window.order[-1]], grey)
-            self._reasons.append(unusable(grey) or (MotionReason.DUPLICATED if repeated else ""))
-            window.push(grey)
+            repeated = bool(window.order) and same_picture(window.images[window.order[-1]], grey)
+            window.push(grey)  # before the look at its pixels, which are then near the processor
+            kept = window.images[window.order[-1]]
+            self._reasons.append(unusable(kept) or (MotionReason.DUPLICATED if repeated else ""))
         else:
             if self._stack:
                 self._check_size(grey, self._stack[-1])

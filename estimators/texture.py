@@ -118,7 +118,7 @@ def texture_power(
     looks
         Number of independent squares that ``power`` is a mean of.
     shapes, family
-        Candidate shapes, and their means in the groups, shape (m, g).
+        Candidate shapes, and their means in the groups (times those of the blur, if there is one), shape (m, g).
     starts
         First bin of every group of neighbouring bins.
     out
@@ -169,7 +169,15 @@ def _best_shape(p: Array, n: Array, shapes: Array, sizes: Array, looks: float) -
 
 @kernel
 def smooth_spectra(
-    power: Plane, pairs: Array, rows: Array, frames: int, shapes: Array, starts: Index, out: Array
+    power: Plane,
+    pairs: Plane,
+    rows: Array,
+    frames: int,
+    shapes: Array,
+    family: Array,
+    starts: Index,
+    blur: Array,
+    out: Array,
 ) -> None:
     """Smooth texture, smooth noise and raw coherent power per row and frame of every class.
 
@@ -183,15 +191,20 @@ def smooth_spectra(
         Number of rows, shape (c,).
     frames
         Number of frames.
-    shapes, starts
-        See :func:`texture_power`.
+    shapes, family, starts
+        See :func:`texture_power`; without blur.
+    blur
+        Power transfer of the blur, shape (f,).
     out
         Texture, noise and coherent power less its noise, shape (3, c, f).
     """
     count = power.shape[1]
     coherent, other, share = np.empty(count), np.empty(count), np.empty(count)
-    family = np.empty((shapes.shape[0], starts.shape[0]))
-    grouped_family(shapes, starts, family)
+    blurred, transfer = np.empty(family.shape), np.empty(starts.shape[0])
+    group_means(blur, starts, transfer)
+    for m in range(family.shape[0]):
+        for g in range(family.shape[1]):
+            blurred[m, g] = family[m, g] * transfer[g]
     for c in range(power.shape[0]):
         mean = 0.0
         for f in range(count):
@@ -204,7 +217,9 @@ def smooth_spectra(
         for f in range(count):
             share[f] = noise[f] / frames
             out[2, c, f] = coherent[f] - share[f]
-        texture_power(coherent, share, rows[c], shapes, family, starts, out[0, c])
+        texture_power(coherent, share, rows[c], shapes, blurred, starts, out[0, c])
+        for f in range(count):
+            out[0, c, f] *= blur[f]
 
 
 def matched_weight(texture: Array, noise: Array, frames: int) -> Array:

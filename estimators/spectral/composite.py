@@ -8,6 +8,7 @@ is only its envelope.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,18 @@ from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.rows import bin_height
 from axialnav.estimators.spectral.blocks import block_notches, blocky
 from axialnav.estimators.spectral.fit import Fit, best_displacement, free_blur
-from axialnav.estimators.spectral.picture import Spectra, composite_rows
+from axialnav.estimators.spectral.picture import Spectra, composite_rows, row_window
+from axialnav.estimators.spectral.shapes import comb, pair_lags
 from axialnav.estimators.spectral.strips import wall_spectra
-from axialnav.estimators.spectral.verdict import MAX_CODED_EXCESS, MAX_EXCESS, why_refused, why_unusable
+from axialnav.estimators.spectral.verdict import why_refused, why_unusable
 from axialnav.estimators.spectral.whittle import SHIFT
 
 LEAST_FRAMES = 2
 LARGEST_PX = 128.0
+FLOOR_PART, LOUD, MIN_LOUD, FLAT = 10, 3.0, 24, 0.02
 UNKNOWN_RATIOS = (0.05, 0.3, 0.7)
 SHORTEST_PX = 0.45
+PLAIN_EXCESS, MIN_COMB = 1.45, 0.5  # spectra further from smooth are asked whether one frame has that comb already
 SYSTEMATIC = 5e-4  # of the displacement: what the smearing of the comb by the window is not known better than
 
 
@@ -64,20 +68,40 @@ def fit_composite(frames: Frames, frame_period_s: float, exposure_s: float | Non
     if spectra is None:
         return refused(MotionReason.BANDS, signed=False, window_s=span_s, method="composite")
     usable = np.ones(len(spectra.frequency), dtype=np.bool_)
-    coded = blocky(rows)
-    if coded:
+    if blocky(rows):
         usable = block_notches(spectra.frequency, spectra.length)
     reach = min(LARGEST_PX, width / (2.0 * (len(stack) - 1)))
     ratio = None if exposure_s is None else exposure_s / frame_period_s
     fit = _fit(spectra, usable, len(stack), ratio, reach)
     displacement = float(fit.theta[SHIFT])
-    reason = why_refused(fit, displacement, SHORTEST_PX, MAX_CODED_EXCESS if coded else MAX_EXCESS)
+    reason = why_refused(fit, displacement, SHORTEST_PX)
+    if not reason and fit.excess > PLAIN_EXCESS and comb_share(stack, spectra, displacement) < MIN_COMB:
+        reason = MotionReason.PERIODIC
     if reason:
         return refused(reason, signed=False, window_s=span_s, method="composite")
     sigma = math.hypot(fit.sigma_px, SYSTEMATIC * displacement)
     return MotionEstimate(
         displacement, sigma, math.nan, True, MotionReason.GOOD, False, span_s, math.nan, 0.0, "composite"
     )
+
+
+def comb_share(stack: list[NDArray[np.unsignedinteger[Any]]], spectra: Spectra, displacement_px: float) -> float:
+    """How much of the structure in the composite's spectrum over that of one frame is the comb [-]: a correlation.
+
+    Bricks and planks have a comb of their own, in every frame; motion makes one that single frames lack.
+    """
+    one = wall_spectra(composite_rows([stack[len(stack) // 2]]), float(bin_height(*stack[0].shape)))
+    if one is None:
+        return 0.0
+    comb_power = np.empty((len(spectra.frequency), 3))
+    window = row_window(spectra.length)[1]
+    comb(displacement_px, 0.0, pair_lags(tuple(range(len(stack)))), spectra.frequency, window, 0.0, comb_power)
+    floor = float(np.median(one.mean[-len(one.mean) // FLOOR_PART :]))
+    loud = one.mean > LOUD * floor
+    if int(loud.sum()) < MIN_LOUD:
+        return 0.0
+    ratio = np.log(spectra.mean[loud] / one.mean[loud])
+    return float(np.corrcoef(ratio, np.log(comb_power[loud, 0] + FLAT))[0, 1])
 
 
 def _fit(spectra: Spectra, usable: NDArray[np.bool_], frames: int, ratio: float | None, reach_px: float) -> Fit:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from axialnav.estimators.spectral.picture import WINDOW_LOOKS, Spectra
 from axialnav.estimators.spectral.problem import Problem, pose
 from axialnav.estimators.spectral.search import climb_all, look, peaks, smooth_fit
-from axialnav.estimators.spectral.whittle import BLUR, NOISE, PARAMETERS, SHIFT, TEXTURE, UNTIED
+from axialnav.estimators.spectral.shapes import pair_lags
+from axialnav.estimators.spectral.whittle import BLUR, NOISE, PARAMETERS, SHIFT, TEXTURE, UNTIED, misfit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -19,12 +20,14 @@ WIDE_REACH_PX = 24.0  # copies nearer than this leave a comb too wide for the ta
 LOWEST, LOW_STARTS = 0.06, 14
 MOST = 5
 MOST_SLOW, MOST_FAST = 2, 3
-STEPS = 12
+STEPS, SHORT_STEPS = 12, 6
 BLUR_STEP = 0.1  # relative
 BLUR_RATIOS = (0.02, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 SAME = 0.01
 SEPARATE, SEPARATE_PX = 0.1, 0.3
-PRIOR_DOF, TINY = 6.0, 1e-12
+PRIOR_DOF, TINY, RIDGE = 6.0, 1e-12, 1e-9
+CLIMB_REACH = 1.3  # climbs that choose among starts see the ripples of that many times the farthest copies
+SHORTER = (1.0, 0.8)  # of a displacement: where to look for one with a frame missing
 MISFIT = 1.25  # the spectra of walls are only nearly smooth; measured on photographs
 
 
@@ -33,16 +36,16 @@ def light_beyond(problem: Problem, theta: Array, model: Array, frequency: float)
 
     A spectrum that fades and stays dark may be that of a lens out of focus; only light on both sides makes a dark line.
     """
-    noise = math.exp(float(theta[NOISE]))
+    noise = max(math.exp(float(theta[NOISE])), TINY * float(model.max()))
     gain = problem.power / noise - problem.power / model - np.log(model / noise)
     return float(problem.weight @ (gain * (problem.frequency > frequency)))
 
 
 def _inverse(J: Array) -> Array:
-    """Inverse of an information; infinite if the picture does not tell everything asked."""
+    """Inverse of an information; huge, not infinite, for what the picture does not tell, say a blur of no length."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(J), TINY))
-    scaled = J * scale * scale[:, None]
-    if float(np.linalg.eigvalsh(scaled)[0]) < TINY:
+    scaled = J * scale * scale[:, None] + RIDGE * np.eye(len(J))
+    if not np.all(np.isfinite(scaled)):
         return np.full_like(J, math.inf)
     return np.asarray(np.linalg.inv(scaled) * scale * scale[:, None])
 
@@ -76,6 +79,10 @@ class Fit:
         Mean squared misfit over the one that the strips' spread explains; 1 for the right model.
     cost
         Misfit per row.
+    per_look
+        Log-likelihood per misfit per row.
+    gap
+        Log-likelihood by which a missing frame explains the picture better; not positive for an even composite.
     """
 
     theta: Array
@@ -85,6 +92,8 @@ class Fit:
     rival_px: float
     excess: float
     cost: float
+    per_look: float
+    gap: float = -math.inf
 
 
 def conclude(spectra: Spectra, problem: Problem, theta: Array, tie: float, which: int, rivals: list[Rival]) -> Fit:
@@ -97,7 +106,7 @@ def conclude(spectra: Spectra, problem: Problem, theta: Array, tie: float, which
     free = [which, *other, *range(TEXTURE, PARAMETERS)]
     inverse = _inverse(problem.information(model, gradient)[np.ix_(free, free)])
     if not np.all(np.isfinite(inverse)):
-        return Fit(theta, math.inf, 0.0, 0.0, math.nan, math.nan, math.inf)
+        return Fit(theta, math.inf, 0.0, 0.0, math.nan, math.nan, math.inf, 0.0)
     influence = gradient[:, free] @ inverse[0]
     scores = spectra.rows * (strips @ influence) / rows
     expected = inverse[0, 0] / rows * dispersion * WINDOW_LOOKS
@@ -112,8 +121,9 @@ def conclude(spectra: Spectra, problem: Problem, theta: Array, tie: float, which
     dark = 1.0 / (problem.frames * max(float(theta[which]), TINY))
     light = light_beyond(problem, theta, model, dark) * per_look
     margin = (rival.cost - best.cost) * per_look
+    cost = misfit(problem.power, problem.weight, model)
     sigma = MISFIT * math.sqrt(variance * max(1.0, excess))
-    return Fit(theta, sigma, margin, light, rival.value_px, excess, best.cost)
+    return Fit(theta, sigma, margin, light, rival.value_px, excess, cost, per_look)
 
 
 def best_displacement(spectra: Spectra, usable: Mask, frames: int, ratio: float, reach_px: float) -> Fit:
@@ -132,9 +142,30 @@ def best_displacement(spectra: Spectra, usable: Mask, frames: int, ratio: float,
     reach_px
         Largest displacement to look for [px].
     """
-    problem = pose(spectra, usable, frames)
+    exact = pose(spectra, usable, frames)
     found = starts(spectra, usable, frames, ratio, reach_px)
-    return _best(spectra, problem, found, ratio, SHIFT)
+    farthest = CLIMB_REACH * (frames - 1 + ratio) * max(float(theta[SHIFT]) for theta in found)
+    problem = pose(spectra, usable, frames, farthest)
+    tops, rivals = _best(problem, found, ratio, SHIFT)
+    theta, _ = exact.climb(tops[0], ratio, _free(SHIFT), STEPS)
+    fit = conclude(spectra, exact, theta, ratio, SHIFT, rivals)
+    least = min(rival.cost for rival in rivals)
+    gapped = [_gapped(problem, times, ratio, tops[:2]) for times in with_gaps(frames)]
+    return replace(fit, gap=max(((least - cost) * fit.per_look for cost in gapped), default=-math.inf))
+
+
+def with_gaps(frames: int) -> list[tuple[int, ...]]:
+    """Times of frames of which one between the others is missing; seen from behind they are the same picture."""
+    return [tuple(k + (k >= gap) for k in range(frames)) for gap in range(1, frames // 2 + 1) if frames > 2]
+
+
+def _gapped(even: Problem, times: tuple[int, ...], ratio: float, near: list[Array]) -> float:
+    """Misfit per row of copies at uneven ``times``."""
+    problem = replace(even, lags=pair_lags(times))
+    starts = [theta.copy() for theta in near for _ in SHORTER]
+    for start, share in zip(starts, SHORTER * len(near), strict=True):
+        start[SHIFT] *= share
+    return min(problem.climb(start, ratio, _free(SHIFT), SHORT_STEPS)[1] for start in starts)
 
 
 def free_blur(spectra: Spectra, usable: Mask, frames: int, near: Fit) -> Fit:
@@ -148,7 +179,7 @@ def free_blur(spectra: Spectra, usable: Mask, frames: int, near: Fit) -> Fit:
         found.append(problem.climb(start, UNTIED, free, STEPS, fresh=True))
     theta, cost = min(found, key=lambda item: item[1])
     rivals = [Rival(float(theta[SHIFT]), cost), Rival(near.rival_px, math.inf)]
-    return replace(conclude(spectra, problem, theta, UNTIED, SHIFT, rivals), margin=near.margin)
+    return replace(conclude(spectra, problem, theta, UNTIED, SHIFT, rivals), margin=near.margin, gap=near.gap)
 
 
 def best_blur(spectra: Spectra, usable: Mask, low_px: float, high_px: float) -> Fit:
@@ -159,21 +190,23 @@ def best_blur(spectra: Spectra, usable: Mask, low_px: float, high_px: float) -> 
     thetas, cost = climb_all(problem, smooth, grid, UNTIED, BLUR)
     within = (thetas[:, BLUR] > low_px) & (thetas[:, BLUR] < high_px)
     order = np.argsort(np.where(within, cost, math.inf))[:MOST]
-    return _best(spectra, problem, [thetas[i] for i in order], UNTIED, BLUR)
+    tops, rivals = _best(problem, [thetas[i] for i in order], UNTIED, BLUR)
+    return conclude(spectra, problem, tops[0], UNTIED, BLUR, rivals)
 
 
-def _best(spectra: Spectra, problem: Problem, found: list[Array], tie: float, which: int) -> Fit:
-    """Climb from every start on all frequencies and keep the highest."""
+def _free(which: int) -> Mask:
+    """What a climb may change: the displacement or the blur, and all nuisances."""
     free = np.ones(PARAMETERS, dtype=np.bool_)
     free[BLUR if which == SHIFT else SHIFT] = False
-    smooth, cost = smooth_fit(problem)
-    best, least, rivals = smooth, math.inf, [Rival(0.0, cost)]
-    for start in found:
-        theta, cost = problem.climb(start, tie, free, STEPS, fresh=True)
-        rivals.append(Rival(float(theta[which]), cost))
-        if cost < least:
-            best, least = theta, cost
-    return conclude(spectra, problem, best, tie, which, rivals)
+    return free
+
+
+def _best(problem: Problem, found: list[Array], tie: float, which: int) -> tuple[list[Array], list[Rival]]:
+    """Climb from every start: where that ended, best first, and all values and misfits, no motion among them."""
+    tops = [problem.climb(start, tie, _free(which), STEPS, fresh=True) for start in found]
+    tops.sort(key=lambda top: top[1])
+    rivals = [Rival(float(theta[which]), cost) for theta, cost in tops]
+    return [theta for theta, _ in tops], [Rival(0.0, smooth_fit(problem)[1]), *rivals]
 
 
 def starts(spectra: Spectra, usable: Mask, frames: int, ratio: float, reach_px: float) -> list[Array]:

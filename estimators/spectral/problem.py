@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.spectral.picture import FIRST_BIN, Spectra, row_window
-from axialnav.estimators.spectral.shapes import comb, smooth_basis
+from axialnav.estimators.spectral.shapes import comb, pair_lags, smooth_basis
 from axialnav.estimators.spectral.whittle import (
     BLUR,
     NOISE,
@@ -40,6 +40,8 @@ class Problem:
     ----------
     frames
         Number of copies N in the picture.
+    lags
+        Numbers of pairs of copies at every lag, as ``pair_lags`` counts them.
     bins
         Which frequencies take part, if they are not grouped, shape (f,).
     frequency, power, weight, basis
@@ -54,6 +56,7 @@ class Problem:
     """
 
     frames: int
+    lags: Array
     bins: NDArray[np.bool_]
     frequency: Array
     power: Array
@@ -68,7 +71,7 @@ class Problem:
     ) -> tuple[Array, float]:
         """Parameters of the highest likelihood near ``start`` and their misfit per row; ``fresh``: texture unknown."""
         return maximise(
-            start, tie, free, self.frames, self.frequency, self.window, self.floor, self.power, self.weight,
+            start, tie, free, self.lags, self.frequency, self.window, self.floor, self.power, self.weight,
             self.basis, self.prior, fresh, steps,
         )  # fmt: skip
 
@@ -76,7 +79,7 @@ class Problem:
         """Model (g,) and the derivatives of its logarithm (g, p)."""
         shape, model = np.empty((len(self.power), 3)), np.empty(len(self.power))
         gradient = np.empty((len(self.power), PARAMETERS))
-        comb(theta[SHIFT], theta[BLUR], self.frames, self.frequency, self.window, self.floor, shape)
+        comb(theta[SHIFT], theta[BLUR], self.lags, self.frequency, self.window, self.floor, shape)
         spectrum(theta, tie, self.basis, shape, model, gradient)
         return model, gradient
 
@@ -128,14 +131,16 @@ def pose(spectra: Spectra, usable: NDArray[np.bool_], frames: int, reach_px: flo
     power = np.add.reduceat(spectra.mean * usable, groups.first)[groups.kept] / groups.count
     window = row_window(spectra.length)[1]
     prior = usual(power, float(spectra.rows.sum()))
-    return Problem(frames, usable, groups.frequency, power, groups.count, groups.basis, window, floor, prior)
+    lags = pair_lags(tuple(range(frames)))
+    return Problem(frames, lags, usable, groups.frequency, power, groups.count, groups.basis, window, floor, prior)
 
 
 def usual(power: Array, rows: float) -> Array:
     """Prior (2, p): walls behind lenses look alike; level and noise are anything."""
     prior = np.zeros((2, PARAMETERS))
-    prior[0, TEXTURE] = np.log(max(float(np.median(power)), TINY))
-    prior[0, NOISE] = np.log(max(float(np.quantile(power, LOW_QUANTILE)), TINY))
+    ordered = np.sort(power)
+    prior[0, TEXTURE] = np.log(max(float(ordered[len(ordered) // 2]), TINY))
+    prior[0, NOISE] = np.log(max(float(ordered[int(LOW_QUANTILE * len(ordered))]), TINY))
     for k, (mean, sigma) in enumerate((USUAL_SLOPE, USUAL_BEND, USUAL_LENS)):
         prior[:, TEXTURE + 1 + k] = mean, 1.0 / (sigma**2 * LOOKS_PER_ROW * rows)
     return prior

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from axialnav.estimators.spectral.picture import row_window
 from axialnav.estimators.spectral.problem import Problem
-from axialnav.estimators.spectral.shapes import TOP_FREQUENCY, comb, smooth_basis
+from axialnav.estimators.spectral.shapes import TOP_FREQUENCY, comb, pair_lags, smooth_basis
 from axialnav.estimators.spectral.whittle import BLUR, NOISE, PARAMETERS, SHIFT
 from axialnav.models.jit import kernel
 
@@ -58,7 +58,7 @@ def comb_table(
     window, basis, shape = row_window(length)[1], smooth_basis(f), np.empty((len(f), 3))
     out = np.empty((len(grid), len(f)), dtype=np.float32)
     for row, d in zip(out, grid, strict=True):
-        comb(d, ratio * d, frames, f, window, 0.0, shape)
+        comb(d, ratio * d, pair_lags(tuple(range(frames))), f, window, 0.0, shape)
         heard = w * (f * ratio * d < LOBES)
         normal = basis.T @ (basis * heard[:, None]) + 1e-6 * np.eye(basis.shape[1])
         smooth = basis @ np.linalg.solve(normal, basis.T @ (heard * np.log(shape[:, 0] + FLOOR)))

@@ -20,7 +20,9 @@ LOWEST_PX = 0.8  # lengths below the shortest are looked at, so that they can be
 REACH = 8  # of the picture's width
 
 
-def fit_single(frames: Frames, frame_period_s: float, exposure_s: float | None) -> MotionEstimate:
+def fit_single(
+    frames: Frames, frame_period_s: float, exposure_s: float | None, highest_frequency: float = 0.5
+) -> MotionEstimate:
     """Displacement per frame period from the blur of the exposure, ``l T / t_e``, without its sign.
 
     Parameters
@@ -29,6 +31,9 @@ def fit_single(frames: Frames, frame_period_s: float, exposure_s: float | None) 
         One frame, or several whose spectra are averaged; (N, h, w) or a sequence, motion along the rows.
     frame_period_s, exposure_s
         Frame period and exposure [s]; without an exposure the blur says nothing about speed.
+    highest_frequency
+        Highest frequency to look at [cycles/px]: video codecs and pictures that were turned or enlarged hold no truth
+        about the finest ones.
 
     Returns
     -------
@@ -53,7 +58,7 @@ def fit_single(frames: Frames, frame_period_s: float, exposure_s: float | None) 
     if len(seen) < len(parts):
         return refused(MotionReason.BANDS, signed=False, window_s=exposure_s, method="single")
     spectra = averaged(seen)
-    usable = np.ones(len(spectra.frequency), dtype=np.bool_)
+    usable = np.asarray(spectra.frequency < highest_frequency)
     fit = best_blur(spectra, usable, LOWEST_PX, spectra.length / REACH)
     blur = float(fit.theta[BLUR])
     reason = why_refused(fit, blur, SHORTEST_PX)

@@ -10,7 +10,8 @@ from axialnav.estimators.result import MotionReason
 from axialnav.estimators.spectral.fit import Fit
 
 MIN_MARGIN, MIN_LIGHT = 12.0, 3.0  # noise among all lengths wins by 7 in one picture of fifty
-MAX_EXCESS, MAX_CODED_EXCESS = 1.45, 3.5  # a codec's noise is not white
+MAX_EXCESS = 10.0  # pictures that are no walls and codecs reach 8
+MAX_GAP = 1.5  # slow combs look alike with a frame missing
 MAX_SHARE, MAX_SIGMA_PX = 0.1, 0.5
 
 
@@ -26,20 +27,21 @@ def _same(a: Image, b: Image) -> bool:
     return bool((a[0] == b[0]).all() and (a == b).all())
 
 
-def why_refused(fit: Fit, length_px: float, shortest_px: float, max_excess: float = MAX_EXCESS) -> str:
+def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
     """Why a fit is not believed; "" if it is.
 
-    It must beat every other length, no motion among them, show light beyond its first dark line,
-    leave residuals no larger than the strips of the picture differ among themselves, and be longer than what can be
-    told from a lens.
+    It must beat every other length, no motion among them, and a missing frame; show light beyond its first dark line;
+    and be longer than what can be told from a lens.  What the model does not explain makes likelihoods count less.
     """
-    if (
-        not (math.isfinite(fit.sigma_px) and math.isfinite(length_px))
-        or min(fit.margin - MIN_MARGIN, fit.light - MIN_LIGHT) < 0.0
-    ):
+    if not (math.isfinite(fit.sigma_px) and math.isfinite(length_px)):
         return MotionReason.AMBIGUOUS
-    if fit.excess > max_excess:
+    deflated = max(1.0, fit.excess)
+    if min(fit.margin / deflated - MIN_MARGIN, fit.light / deflated - MIN_LIGHT) < 0.0:
+        return MotionReason.AMBIGUOUS
+    if fit.excess > MAX_EXCESS:
         return MotionReason.MODEL
+    if fit.gap > MAX_GAP * deflated:
+        return MotionReason.UNEVEN
     if length_px < shortest_px:
         return MotionReason.SHORT
     return MotionReason.SIGMA if fit.sigma_px > min(MAX_SHARE * length_px, MAX_SIGMA_PX) else ""

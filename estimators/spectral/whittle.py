@@ -23,7 +23,7 @@ SHIFT, BLUR, TEXTURE, NOISE, PARAMETERS = 0, 1, 2, 6, 7
 UNTIED = -1.0
 MAX_EXPONENT = 60.0
 FAINT, FIRM, TINY = 0.05, 100.0, 1e-9  # FIRM: rows times looks that the prior is worth in a straight fit
-FIRST_DAMPING, MAX_REFUSALS, ENOUGH = 1e-2, 6, 1e-8
+FIRST_DAMPING, MAX_REFUSALS, ENOUGH = 1e-2, 6, 1e-7
 
 
 @kernel
@@ -149,7 +149,7 @@ def maximise(
     start: Array,
     tie: float,
     free: NDArray[np.bool_],
-    frames: int,
+    lags: Array,
     frequency: Array,
     window: Array,
     floor: float,
@@ -174,7 +174,7 @@ def maximise(
     for _ in range(steps + 1):
         if tie >= 0.0:
             trial[BLUR] = tie * trial[SHIFT]
-        comb(trial[SHIFT], trial[BLUR], frames, frequency, window, floor, shape)
+        comb(trial[SHIFT], trial[BLUR], lags, frequency, window, floor, shape)
         if fresh and cost == math.inf:
             straight_start(trial, shape, power, weight, basis, prior)
         spectrum(trial, tie, basis, shape, model, gradient)

@@ -192,7 +192,7 @@ def test_coherent_power_and_the_search_agree_with_brute_force() -> None:
     found = search.profiles(_ring(p_re), _ring(p_im), np.arange(FRAMES), weight[None], grid, np.ones(1))
     brute = [_likelihood(re, im, omega, weight, d * np.arange(FRAMES)) for d in grid[::2]]
     np.testing.assert_allclose(found.gain[0, ::2], brute, rtol=1e-3, atol=1e-3 * np.abs(brute).max())
-    out = np.empty((1, band.count))
+    out = np.empty((1, band.count), dtype=np.float32)
     coherent_power(p_re, p_im, omega, 1.5 * np.arange(FRAMES), out)
     assert 2.0 * out.sum() == pytest.approx(_likelihood(re, im, omega, weight, 1.5 * np.arange(FRAMES)), rel=1e-3)
 

@@ -9,7 +9,7 @@ import pytest
 
 from axialnav.estimators.spectral.picture import FIRST_BIN, Spectra, row_window
 from axialnav.estimators.spectral.problem import group_edges, pose
-from axialnav.estimators.spectral.shapes import comb
+from axialnav.estimators.spectral.shapes import comb, pair_lags
 from axialnav.estimators.spectral.whittle import BLUR, NOISE, PARAMETERS, SHIFT, UNTIED, pull, solve_spd
 
 LENGTH, FRAMES = 640, 5
@@ -19,7 +19,7 @@ WIDE = np.ones(4096)  # autocorrelation of a window without end
 
 def shape_of(displacement_px: float, blur_px: float, window: np.ndarray = WIDE) -> np.ndarray:
     out = np.empty((len(FREQUENCY), 3))
-    comb(displacement_px, blur_px, FRAMES, FREQUENCY, window, 0.0, out)
+    comb(displacement_px, blur_px, pair_lags(tuple(range(FRAMES))), FREQUENCY, window, 0.0, out)
     return out
 
 
@@ -40,6 +40,14 @@ def test_copies_further_apart_than_the_window_do_not_interfere() -> None:
     window = np.zeros(10)
     window[0] = 1.0
     np.testing.assert_allclose(shape_of(20.0, 0.0, window)[:, 0], 1.0 / FRAMES, rtol=1e-6)
+
+
+def test_lags_of_uneven_frames_give_the_comb_of_their_sum() -> None:
+    """Brute force: the power of the mean of copies at 0, 1, 3 and 4 times the displacement."""
+    times, displacement_px, out = (0, 1, 3, 4), 7.3, np.empty((len(FREQUENCY), 3))
+    comb(displacement_px, 0.0, pair_lags(times), FREQUENCY, np.ones(200), 0.0, out)
+    copies = np.exp(2j * np.pi * FREQUENCY[:, None] * displacement_px * np.array(times))
+    np.testing.assert_allclose(out[:, 0], np.abs(copies.mean(axis=1)) ** 2, atol=1e-6)
 
 
 def test_the_combs_derivatives_are_those_of_differences() -> None:
