@@ -11,7 +11,7 @@ from axialnav.estimators.spectral.fit import Fit
 
 MIN_MARGIN, MIN_LIGHT = 12.0, 3.0  # noise among all lengths wins by 7 in one picture of fifty
 MAX_EXCESS = 10.0  # pictures that are no walls and codecs reach 8
-MAX_GAP = 1.5  # slow combs look alike with a frame missing
+MAX_GAP, GAP_SHARE = 1.5, 0.13  # of the margin: slow combs, half a ridge in view, look alike with a frame missing
 MAX_SHARE, MAX_SIGMA_PX = 0.1, 0.5
 
 
@@ -40,7 +40,7 @@ def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
         return MotionReason.AMBIGUOUS
     if fit.excess > MAX_EXCESS:
         return MotionReason.MODEL
-    if fit.gap > MAX_GAP * deflated:
+    if fit.gap > MAX_GAP * deflated + GAP_SHARE * fit.margin:
         return MotionReason.UNEVEN
     if length_px < shortest_px:
         return MotionReason.SHORT
