@@ -164,6 +164,17 @@ def test_a_million_random_and_mutated_bytes_do_no_harm(key: bytes | None) -> Non
     assert survived.most_waiting < 4 * MAX_PARSED
 
 
+def test_a_stream_that_never_pauses_at_the_end_of_a_packet_is_not_kept() -> None:
+    """As from a serial port: every read ends within a packet, so that the parser's buffer is never empty."""
+    packer, heard, count, rest = talker(), receiver(), 0, b""
+    for k in range(2000):
+        data = rest + packet(packer, k)
+        rest = data[-20:]
+        count += len(heard.feed(data[:-20], 0))
+        assert len(heard._parser.buf) < 2 * MAX_PARSED
+    assert count >= 1998
+
+
 class Wire:
     """A link that keeps what is sent."""
 
