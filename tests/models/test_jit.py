@@ -74,6 +74,26 @@ def test_a_part_is_compiled_once_and_read_from_disk_for_another_whole(tmp_path: 
     assert outer_of_three(tmp_path) == "6.0"
 
 
+def test_the_object_code_of_a_whole_names_none_of_its_parts(tmp_path: Path) -> None:
+    """Two wholes hold their own copies of a part, each with other arguments optimised away.
+
+    Were the copies named in the object code, the loader could hand out one of them for the other; that ended in a crash
+    of the process.
+    """
+    decorator = DECORATORS[1]
+    package = copy_of_the_package(tmp_path, decorator)
+    body = "".join(f"    x = math.sin(x + {i}.0) * math.cos(x) + x * {i}.5\n" for i in range(60))
+    calls = " + ".join(f"inner(x + {i}.0)" for i in range(12))  # too large and too often called to be inlined
+    inner = INNER.format(factor=2.0, decorator=decorator).replace("    return", body + "    return")
+    (package / "models" / "inner.py").write_text("import math\n" + inner)
+    (package / "models" / "outer.py").write_text(CALLER.format(decorator=decorator).replace("inner(x)", calls))
+    say = """from axialnav.models.inner import inner; outer(3.0)
+whole, part = (next(iter(f.overloads.values())) for f in (outer, inner.part))
+code, name = whole.library._get_compiled_object(), part.fndesc.mangled_name
+print(whole.fndesc.mangled_name.encode() in code, name in whole.library.get_llvm_str(), name.encode() in code)"""
+    assert outer_of_three(tmp_path, say) == "True True False"
+
+
 def test_the_stamp_sees_every_source(tmp_path: Path) -> None:
     package = copy_of_the_package(tmp_path)
     before = source_stamp(package)
