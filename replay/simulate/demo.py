@@ -35,7 +35,7 @@ def demo_mission() -> Mission:
             SectionPlan(kind="straight", length_m=5.0),
         ),
         vehicle=VehiclePlan(speed_m_s=1.2, still_s=2.0),
-        camera=CameraPlan(width_px=320, height_px=240, focal_px=240.0),  # 67 degrees: the mean over it is near its axis
+        camera=CameraPlan(width_px=320, height_px=240, focal_px=240.0),
         uwb=UwbPlan(condition="corner"),
     )
     check_mission(mission)
