@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/installed.stamp
 DOCS_INSTALLED := $(VENV)/installed-docs.stamp
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: help demo paper test quick lint docs bench bench-flights bench-motion bench-fusion bench-live bench-faults bench-corridor bench-tune bench-tools readme-check clean
+.PHONY: help demo paper test quick lint docs bench bench-flights bench-motion bench-fusion bench-live bench-faults bench-corridor bench-axial bench-tune bench-tools readme-check clean
 .DEFAULT_GOAL := help
 
 help:
@@ -18,7 +18,7 @@ help:
 	@echo "make lint          style, types and layering"
 	@echo "make docs          the documentation, into docs/_build/html"
 	@echo "make bench         accuracy on the real flights; also bench-motion, bench-fusion, bench-faults, bench-corridor,"
-	@echo "                   bench-live, bench-tune, bench-tools"
+	@echo "                   bench-live, bench-axial, bench-tune, bench-tools"
 	@echo "make paper         the paper's field flights again, simulated: Table 1 and Fig. 11 into runs/paper"
 	@echo "make readme-check  run every command of the README in a fresh clone"
 	@echo "make clean         remove what the commands above have made, .venv included"
@@ -58,7 +58,7 @@ docs: $(DOCS_INSTALLED)
 	@echo "docs/_build/html/index.html"
 
 bench: bench-flights
-bench-flights bench-motion bench-fusion bench-faults bench-corridor bench-live bench-tune bench-tools: bench-%: $(INSTALLED)
+bench-flights bench-motion bench-fusion bench-faults bench-corridor bench-live bench-axial bench-tune bench-tools: bench-%: $(INSTALLED)
 	@$(BIN)/python -m tests.bench.bench_$*
 
 paper: $(INSTALLED)

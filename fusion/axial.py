@@ -25,17 +25,19 @@ from axialnav.fusion.axial_held import Held
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.events import Events
-from axialnav.fusion.kernels.measure import BLUR, FLOW, measure
+from axialnav.fusion.kernels.measure import measure
 from axialnav.fusion.kernels.propagate import rotate_sample
-from axialnav.fusion.kernels.reanchor import observe_source, reanchor
-from axialnav.fusion.kernels.run import note_arrival
-from axialnav.fusion.kernels.update import MIN_WEIGHT, is_uwb, redescend
+from axialnav.fusion.kernels.run import conclude, receive
+from axialnav.fusion.kernels.shadow import carry_shadow, note_velocity
+from axialnav.fusion.kernels.supervise import end_block
+from axialnav.fusion.kernels.update import MIN_WEIGHT, redescend
 from axialnav.fusion.kernels.window import note_motion
 from axialnav.fusion.memory import (
     LOG_CODE,
     LOG_GATE,
     LOG_INNOVATION,
     LOG_NIS,
+    LOG_REASON,
     LOG_VARIANCE,
     LOG_WEIGHT,
     Memory,
@@ -46,7 +48,6 @@ from axialnav.fusion.memory import (
 )
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind, build_sources
-from axialnav.fusion.supervisor import SourceState
 from axialnav.models.imu import strapdown
 from axialnav.models.rig import AttitudeSource, Imu
 from axialnav.models.rotations import quaternion_from_euler, rotation_matrix
@@ -56,7 +57,6 @@ from axialnav.models.tangent import rotation_between
 Array = NDArray[np.float64]
 DOUBT_TIME_S = 2.0
 RELIEF = 0.5  # an accelerometer in doubt is believed again below this share of the limit
-SUSPECT_TRUST = 0.1  # mean weight of a UWB source, below which it is flagged
 MAX_TILT_COSINE = 0.2  # steeper than 78 degrees, tilt says nothing of the acceleration
 
 
@@ -133,11 +133,14 @@ class AxialFilter:
         return memory
 
     def step(self, t_ns: int, source: int, values: Array, memory: Memory, log: Array) -> None:
-        """Process one event; ``log`` (10,) receives its record in the layout of :mod:`axialnav.fusion.memory`."""
+        """Process one event; ``log`` (11,) receives its record in the layout of :mod:`axialnav.fusion.memory`."""
         core, kind = memory.core[0], int(self.sources["kind"][source])
         log[:] = 0.0
         if kind == int(self.driver) or (kind == int(Kind.ATTITUDE) and core["started"]):
-            self._drive(t_ns, source, values, core, kind == int(self.driver))
+            note_velocity(core, self._scratch[0])
+            dt = self._drive(t_ns, source, values, core, kind == int(self.driver))
+            if kind == int(self.driver):
+                self._supervise(t_ns, dt, memory)
             log[LOG_NIS], log[LOG_GATE], log[LOG_WEIGHT] = math.nan, math.nan, 1.0
             memory.sources[source]["t_seen"] = memory.sources[source]["t_fused"] = t_ns
         elif not core["started"]:
@@ -157,27 +160,41 @@ class AxialFilter:
         """Body-to-world quaternion of the autopilot's angles (FRD to NED): pitch and yaw turn the other way in FLU."""
         return quaternion_from_euler(roll, -pitch, self._heading_rad - yaw)
 
-    def _drive(self, t_ns: int, source: int, values: Array, core: Any, drives: bool) -> None:
-        """A sample that moves the filter on, or an attitude beside inertial samples."""
+    def _drive(self, t_ns: int, source: int, values: Array, core: Any, drives: bool) -> float:
+        """A sample that moves the filter on, or an attitude beside inertial samples; the time it was moved by [s]."""
         x, dt = core["x"][0], (t_ns - int(core["t_imu"])) * 1e-9
         first = not core["started"]
         if drives and (first or dt > 0.0):
             core["started"], core["t_imu"] = 1, t_ns
+        step_s = 0.0 if first or not drives else max(dt, 0.0)
         if int(self.sources["kind"][source]) == int(Kind.IMU):
             rotate_sample(values, self.sources["R_BS"][source], self._row)
             mean = 0.5 * (core["imu"] + self._row)
-            if not first and dt > 0.0:
+            if step_s > 0.0:
                 self._inertial(core, mean, dt)
             if first or dt > 0.0:
                 core["imu"] = self._row
-            return
+            return step_s
         before = x[QUAT : QUAT + 4].copy()
         x[QUAT : QUAT + 4] = self._attitude(values[0], values[1], values[2])
-        if drives and not first and dt > 0.0:
+        if step_s > 0.0:
             turn = np.empty(3)
             rotation_between(before, x[QUAT : QUAT + 4], turn)
             core["imu"][:3] = turn / dt
             self._predict(core, dt, self._tilt_acceleration(x), self.config.axial.thrust_noise)
+        return step_s
+
+    def _supervise(self, t_ns: int, dt: float, memory: Memory) -> None:
+        """Shadow and supervisor after a step: those of the 25-state filter."""
+        core, w = memory.core[0], self._scratch[0]
+        if dt > 0.0:
+            self.held.drift_shadow(core["x"][0], core["shadow_v"], core["shadow_V"], w["v_before"], dt)
+        carry_shadow(t_ns, dt, core, w)
+        if dt > 0.0:
+            resets = int(core["resets"])
+            end_block(t_ns, self.sources, memory.sources, core, w, self.settings[0])
+            if core["resets"] > resets:
+                self._part_position(core)
 
     def _inertial(self, core: Any, sample: Array, dt: float) -> None:
         """Predict with rate and specific force (6,) in body axes."""
@@ -228,75 +245,67 @@ class AxialFilter:
         core["P"][0] = S + self.held.E @ self._ekf.P @ self.held.E.T
 
     def _aid(self, t_ns: int, source: int, values: Array, memory: Memory, log: Array) -> None:
-        """One reading: bookkeeping, gate, update, recovery; the same steps as in the 25-state filter."""
-        core, s, seen, kind = (
-            memory.core[0],
-            self.sources[source],
-            memory.sources[source],
-            int(self.sources["kind"][source]),
-        )
-        gap_s = (t_ns - int(seen["t_seen"])) * 1e-9
-        note_arrival(t_ns, gap_s, kind, values, seen, core)
-        w, x = self._scratch[0], core["x"][0]
+        """One reading: what the supervisor says, gate, update, what it learns; as in the 25-state filter."""
+        core, s, seen, w = memory.core[0], self.sources[source], memory.sources[source], self._scratch[0]
+        gap_s = receive(t_ns, s, seen, values, core, w, self.settings[0])
+        x = core["x"][0]
         w["p"] = x[POS : POS + 3] + (t_ns - int(core["t_imu"])) * 1e-9 * x[VEL : VEL + 3]
         w["R"] = rotation_matrix(x[QUAT : QUAT + 4])
         axes = measure(t_ns, s, seen, values, x, core["P"][0], core, w, self.settings[0])
-        log[LOG_CODE] = axes
-        used = axes > 0 and self._fuse(axes, s, seen, core, w, log)
-        if used:
-            seen["t_fused"] = t_ns
-            if FLOW <= kind <= BLUR:
-                core["t_flow"] = core["t_aid"] = t_ns
-        if is_uwb(kind):
-            if used:
-                core["t_aid"] = t_ns
-            if log[LOG_CODE] > 0.0:
-                observe_source(t_ns, gap_s, axes, float(log[LOG_WEIGHT]), seen, w)
-                seen["state"] = int(SourceState.SUSPECT if seen["trust"] < SUSPECT_TRUST else SourceState.OK)
-            if not used:
-                self._recover(t_ns, seen, core, w)
+        w["row"], w["would"] = 0.0, 0.0
+        w["row"][LOG_CODE] = axes
+        if axes > 0:
+            self._fuse(axes, s, core, w)
+        log[:] = w["row"]
+        conclude(t_ns, gap_s, s, seen, core, w)
 
-    def _fuse(self, axes: int, s: Any, seen: Any, core: Any, w: Any, log: Array) -> bool:
-        """Gate a reading and correct both parts of the state with it; whether it was used."""
-        x, P, H = core["x"][0], core["P"][0], w["H"][:axes].copy()
-        repeated = float(w["repeated"])
-        y, variance = (w["z"] - w["h"])[:axes], w["variance"][:axes] * repeated
+    def _fuse(self, axes: int, s: Any, core: Any, w: Any) -> None:
+        """Gate a reading and correct both parts of the state with it; its record goes to ``w.row``."""
+        P, H, row = core["P"][0], w["H"][:axes].copy(), w["row"]
+        y, variance = (w["z"] - w["h"])[:axes], w["variance"][:axes] * float(w["repeated"])
         S = H @ P @ H.T + np.diag(variance)
         nis = float(y @ np.linalg.solve(S, y)) if np.isfinite(S).all() else math.nan
         if not math.isfinite(nis):
-            log[LOG_CODE] = -int(Reason.NOT_FINITE)
-            return False
+            row[LOG_CODE] = -int(Reason.NOT_FINITE)
+            return
         gate = float(s["gate"][axes - 1])
-        weight = redescend(nis / axes, float(s["soft_nis"])) if nis <= gate else 0.0
-        log[LOG_INNOVATION : LOG_INNOVATION + axes], log[LOG_VARIANCE : LOG_VARIANCE + axes] = y, np.diag(S)
-        log[LOG_NIS], log[LOG_GATE], log[LOG_WEIGHT] = nis, gate, weight
-        if weight <= MIN_WEIGHT:
-            return False
-        R, ekf = np.diag(variance / weight), self._ekf
+        w["would"] = redescend(nis / axes, float(s["soft_nis"])) if nis <= gate else 0.0
+        weight = 0.0 if w["refused"] else float(w["would"])
+        row[LOG_INNOVATION : LOG_INNOVATION + axes], row[LOG_VARIANCE : LOG_VARIANCE + axes] = y, np.diag(S)
+        row[LOG_NIS], row[LOG_GATE], row[LOG_WEIGHT], row[LOG_REASON] = nis, gate, weight, w["refused"]
+        if weight > MIN_WEIGHT:
+            self._correct(H, y, np.diag(variance / weight), core, w)
+
+    def _correct(self, H: Array, y: Array, R: Array, core: Any, w: Any) -> None:
+        """Update the four states by filterpy, and what is held by its own rule."""
+        x, ekf, axes = core["x"][0], self._ekf, len(y)
         ekf.x = self.held.states(x)
-        ekf.P, held = self.held.split(P)
+        ekf.P, held = self.held.split(core["P"][0])
         H4 = H @ self.held.E
         held_after = self.held.correct(x, held, H, y, R + H4 @ ekf.P @ H4.T)
         z, h = w["z"][:axes].copy(), w["h"][:axes].copy()
         ekf.update(z, lambda _: H4, lambda _: h, R=R + H @ held @ H.T)
         self._put(core, held_after)
-        return True
 
-    def _recover(self, t_ns: int, seen: Any, core: Any, w: Any) -> None:
-        """Re-anchor the position where a UWB source was refused for too long; then part it again along and across."""
-        if not reanchor(t_ns, seen, core, w, self.settings[0]):
-            return
+    def _part_position(self, core: Any) -> None:
+        """Part a position that was moved along and across again."""
         across, along, P = self.held.across, np.outer(self.held.axis, self.held.axis), core["P"][0]
         block = P[E_POS : E_POS + 3, E_POS : E_POS + 3]
         block[:] = along * (self.held.axis @ block @ self.held.axis) + across @ block @ across
 
 
 def axial_settings(config: Config) -> Records:
-    """Numbers for the shared kernels; where no inertial unit is mounted, those of a standard one (they go unused)."""
+    """Numbers for the shared kernels; where no inertial unit is mounted, those of a standard one (they go unused).
+
+    The shadow is carried by what drives this filter, so it has the noise of that.
+    """
     units = [n for n, spec in config.sensor.items() if isinstance(spec, Imu) and n not in config.disabled]
-    if units:
-        return build_settings(config)
-    return build_settings(msgspec.structs.replace(config, sensor={**config.sensor, "": Imu()}))
+    if not units:
+        config = msgspec.structs.replace(config, sensor={**config.sensor, "": Imu()})
+    settings = build_settings(config)
+    noise = config.axial.accel_noise if units else config.axial.thrust_noise
+    settings["shadow_m_s2"] = np.hypot(settings["shadow_m_s2"], noise)
+    return settings
 
 
 def _driver(config: Config) -> Kind:

@@ -14,8 +14,8 @@ from axialnav.fusion.config import Config
 from axialnav.fusion.corridor import CorridorEstimator, NotStartedError, PastStateError
 from axialnav.fusion.errors import ConfigError
 from axialnav.fusion.events import Events, Table, pack_tables
-from axialnav.fusion.kernels.run import health, write_track
-from axialnav.fusion.memory import LOG_WIDTH, TRACK_FLAGS, TRACK_WIDTH, Memory, Records
+from axialnav.fusion.kernels.run import health, packed_states, write_track
+from axialnav.fusion.memory import LOG_WIDTH, TRACK_FLAGS, TRACK_STATES, TRACK_WIDTH, Memory, Records
 from axialnav.fusion.outcome import AxialState, Health
 from axialnav.fusion.sources import Kind
 from axialnav.fusion.stream import SteppedStream, Stream
@@ -124,6 +124,7 @@ def run_axial(
             core = memory.core[0]
             write_track(core, track[row])
             track[row, TRACK_FLAGS] = health(t_ns, filter_.sources, memory.sources, core, filter_.settings[0])
+            track[row, TRACK_STATES] = packed_states(memory.sources)
             row += 1
         if progress is not None and e % report_every == report_every - 1:
             progress((e + 1) / len(events.t_ns))

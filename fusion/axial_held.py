@@ -117,6 +117,17 @@ class Held:
         S[E_WALL_OFFSET, E_WALL_OFFSET] += self.offset_walk * dt
         return np.asarray(S)
 
+    def drift_shadow(self, x: Array, v: Array, V: Array, v_before: Array, dt: float) -> None:
+        """Let the shadow, too, forget its velocity ``v`` (3,) across the axis over ``dt`` [s]; call it before its step.
+
+        The shadow moves by what the filter's velocity changed from ``v_before`` (3,) to that in ``x`` (26,); across the
+        axis that is turned in place into its own change.  Its covariance ``V`` (3, 3) receives the lateral noise.
+        """
+        keep, across = math.exp(-dt / self.lateral_time_s), self.across
+        A = np.outer(self.axis, self.axis) + keep * across
+        V[:] = A @ V @ A.T + (1.0 - keep**2) * self.lateral_variance * across
+        v_before += across @ (x[VEL : VEL + 3] + (1.0 - keep) * v - v_before)
+
     def correct(self, x: Array, S: Array, H: Array, y: Array, R: Array) -> Array:
         """Update the held part of ``x`` in place; return its new covariance.
 

@@ -85,10 +85,6 @@ SOURCE_MEMORY: Final = np.dtype(
         ("gap_s", "f8"),  # mean time between readings
         ("datum_m", "f8"),  # zero of a height sensor
         ("trust", "f8"),  # mean weight
-        # fading least-squares fit of a position offset to the innovations
-        ("fit", "f8", (3, 3)),
-        ("fit_rhs", "f8", 3),
-        ("fit_energy", "f8"),
         # the supervisor's (kernels.tracker, kernels.supervise)
         ("state", "i8"),
         ("held", "i8"),  # whether its readings are refused altogether

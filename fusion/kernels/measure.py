@@ -123,6 +123,13 @@ def _uwb_variance(claimed_sigma: float, place: int, other: int, s: Record, seen:
 
 
 @kernel
+def obstructed(power_difference_db: float, c: Record) -> float:
+    """Factor on the variance of a range whose total power exceeds that of its first path; NaN: not reported, 1."""
+    excess = (power_difference_db - c.nlos_db) / c.nlos_scale_db
+    return 1.0 + excess * excess if excess > 0.0 else 1.0
+
+
+@kernel
 def _measure_uwb_range(
     t_ns: int, s: Record, seen: Record, values: Array, x: Array, m: Record, w: Record, c: Record
 ) -> int:
@@ -134,7 +141,7 @@ def _measure_uwb_range(
         return -OUT_OF_RANGE
     place = place_of(t_ns, a, s, m, c)
     w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], place, w.H[0])
-    w.variance[0] = _uwb_variance(values[2], place, 0, s, seen, w, c)
+    w.variance[0] = _uwb_variance(values[2], place, 0, s, seen, w, c) * obstructed(values[3] - values[4], c)
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 

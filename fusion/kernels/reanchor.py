@@ -1,13 +1,10 @@
-"""Recovery from lock-out: where a UWB source is refused for long and one offset explains it, move the position to it.
+"""What recovery from lock-out is made of: how far a source is trusted, and moving the position to it.
 
 Only the position is moved, its covariance opened and its correlations cut; velocity and tilt are never reset by UWB.
-The offset comes from a fading least-squares fit of position to the refused readings, so any mix of ranges, range
-differences and fixes serves.
+When and where to is the supervisor's to say (:mod:`.supervise`).
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +14,11 @@ from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_POS, N_ERROR, POS
 
 Array = NDArray[np.float64]
-FIT_TIME_S = 1.0
 SILENCE_S = 1.0
 TRUST_TIME_S = 0.5
 TRUSTED = 0.2  # mean weight below which a source counts as refused
-EXPLAINED = 0.8  # share of the squared innovations that one offset must explain
 FLOW_FRESH_S = 1.0
 MAX_CONDITION = 1e6
-MAX_INNOVATION_M = 1e3
 
 
 @kernel
@@ -34,54 +28,6 @@ def note_trust(t_ns: int, gap_s: float, time_s: float, weight: float, seen: Reco
     seen.trust += blend * (weight - seen.trust)
     if seen.trust > TRUSTED or gap_s > SILENCE_S:
         seen.t_trusted = t_ns  # silence is no refusal: patience starts with the first reading after it
-
-
-@kernel
-def observe_source(t_ns: int, gap_s: float, axes: int, weight: float, seen: Record, w: Record) -> None:
-    """Add one reading of a source to its fading fit and its mean weight."""
-    note_trust(t_ns, gap_s, TRUST_TIME_S, weight, seen)
-    step = min(max(gap_s, 0.0), 1.0)
-    fade = math.exp(-step / FIT_TIME_S)
-    _fade_fit(0.0 if gap_s > SILENCE_S else fade, seen)
-    for i in range(axes):
-        y = w.z[i] - w.h[i]
-        if abs(y) > MAX_INNOVATION_M:
-            continue
-        seen.fit_energy += y * y
-        for a in range(3):
-            seen.fit_rhs[a] += w.H[i, E_POS + a] * y
-            for b in range(3):
-                seen.fit[a, b] += w.H[i, E_POS + a] * w.H[i, E_POS + b]
-
-
-@kernel
-def _fade_fit(fade: float, seen: Record) -> None:
-    seen.fit_energy *= fade
-    for a in range(3):
-        seen.fit_rhs[a] *= fade
-        for b in range(3):
-            seen.fit[a, b] *= fade
-
-
-@kernel
-def reanchor(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> bool:
-    """Move the position to a source that has been refused too long, if one offset explains its readings."""
-    aided = (t_ns - m.t_flow) * 1e-9 < FLOW_FRESH_S
-    patience_s = c.reanchor_aided_s if aided else c.reanchor_alone_s
-    if (t_ns - seen.t_trusted) * 1e-9 < patience_s:
-        return False
-    if not solve_symmetric(seen.fit, seen.fit_rhs, w.y):
-        return False
-    explained = 0.0
-    for a in range(3):
-        explained += seen.fit_rhs[a] * w.y[a]
-    if explained < EXPLAINED * seen.fit_energy:
-        return False
-    move_position(t_ns, w.y, m)
-    seen.t_trusted = t_ns
-    seen.trust = 1.0
-    _fade_fit(0.0, seen)
-    return True
 
 
 @kernel

@@ -13,11 +13,10 @@ from axialnav.fusion.kernels.examine import examine, learn
 from axialnav.fusion.kernels.measure import BLUR, FLOW, HEIGHT
 from axialnav.fusion.kernels.propagate import propagate
 from axialnav.fusion.kernels.rival import supervise_imu
-from axialnav.fusion.kernels.shadow import start_shadow, step_shadow
-from axialnav.fusion.kernels.supervise import close_block
+from axialnav.fusion.kernels.shadow import carry_shadow, note_velocity
+from axialnav.fusion.kernels.supervise import end_block
 from axialnav.fusion.kernels.update import MIN_WEIGHT, fuse, is_uwb
 from axialnav.fusion.memory import (
-    BLOCK_S,
     LOG_CODE,
     LOG_WEIGHT,
     LOG_WIDTH,
@@ -33,7 +32,7 @@ from axialnav.fusion.outcome import Health, Reason
 from axialnav.fusion.supervisor import MAX_STATES, STATE_BITS, SourceState
 from axialnav.models.jit import Record, Records
 from axialnav.models.scalar_kernel import kernel
-from axialnav.models.state import E_POS, E_VEL, N_ERROR, N_NOMINAL, POS, VEL
+from axialnav.models.state import E_POS, E_VEL, N_ERROR, N_NOMINAL, POS
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -44,7 +43,6 @@ POSITION_RESET, SOURCE_TIMEOUT = int(Health.POSITION_RESET), int(Health.SOURCE_T
 MOTION_SUSPECT, DISAGREE = int(Health.MOTION_SUSPECT), int(Health.DISAGREE)
 OFF, ALIGNING, OK = int(SourceState.OFF), int(SourceState.ALIGNING), int(SourceState.OK)
 SUSPECT, REACQUIRE = int(SourceState.SUSPECT), int(SourceState.REACQUIRE)
-BLOCK_NS = round(BLOCK_S * 1e9)
 NOT_ALIGNED = int(Reason.NOT_ALIGNED)
 GAP_BLEND, SILENCE_S, LEAST_GAP_S = 0.02, 1.0, 1e-3
 RESET_SHOWN_S = 1.0
@@ -90,28 +88,18 @@ def inertial_step(
     t_ns: int, values: Array, s: Record, sources: Records, memory: Records, m: Record, w: Record, c: Record
 ) -> None:
     """Advance the filter, its shadow and the supervisor's clock to an inertial sample."""
-    for i in range(3):
-        w.v_before[i] = m.x[0, VEL + i]
+    note_velocity(m, w)
     dt = propagate(t_ns, values, s.R_BS, m, w, c)
-    if m.t_block == 0:
-        start_shadow(m)
-        m.t_block = t_ns
+    carry_shadow(t_ns, dt, m, w)
     if dt > 0.0:
-        step_shadow(dt, w.v_before, m)
         supervise_imu(dt, m, c)
-        if t_ns - m.t_block >= BLOCK_NS and c.supervised > 0.0:
-            close_block(t_ns, sources, memory, m, w, c)
+        end_block(t_ns, sources, memory, m, w, c)
 
 
 @kernel
 def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record, log: Array) -> None:
     """One reading: bookkeeping, what the supervisor says, both filters, what the supervisor learns."""
-    kind = s.kind
-    gap_s = (t_ns - seen.t_seen) * 1e-9
-    note_arrival(t_ns, gap_s, kind, values, seen, m)
-    w.refused = examine(t_ns, s, seen, values, m, w, c) if c.supervised > 0.0 else 0
-    for i in range(3):
-        w.v_before[i] = m.x[0, VEL + i]
+    gap_s = receive(t_ns, s, seen, values, m, w, c)
     # the rival first, so that the record and the scratch left behind are the estimate's
     evidence, both_used = 0.0, m.on_trial == 1
     for row in range(m.on_trial, -1, -1):
@@ -122,14 +110,32 @@ def process(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Rec
         m.evidence += evidence
     for k in range(LOG_WIDTH):
         log[k] = w.row[k]
-    used = log[LOG_CODE] > 0.0 and log[LOG_WEIGHT] > MIN_WEIGHT
-    if used:
+    conclude(t_ns, gap_s, s, seen, m, w)
+
+
+@kernel
+def receive(t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
+    """Before a reading is fused: bookkeeping, and what the supervisor says into ``w.refused``.
+
+    Returns the time since the source's last reading [s].
+    """
+    gap_s = (t_ns - seen.t_seen) * 1e-9
+    note_arrival(t_ns, gap_s, s.kind, values, seen, m)
+    w.refused = examine(t_ns, s, seen, values, m, w, c) if c.supervised > 0.0 else 0
+    note_velocity(m, w)
+    return float(gap_s)
+
+
+@kernel
+def conclude(t_ns: int, gap_s: float, s: Record, seen: Record, m: Record, w: Record) -> None:
+    """After a reading was fused or refused, as ``w.row`` tells: what aids the filter, what the supervisor learns."""
+    if w.row[LOG_CODE] > 0.0 and w.row[LOG_WEIGHT] > MIN_WEIGHT:
         seen.t_fused = t_ns
-        if FLOW <= kind <= BLUR:
+        if FLOW <= s.kind <= BLUR:
             m.t_flow = t_ns
             m.t_aid = t_ns
-    if is_uwb(kind) and used:
-        m.t_aid = t_ns
+        if is_uwb(s.kind):
+            m.t_aid = t_ns
     learn(t_ns, gap_s, s, seen, m, w)
 
 

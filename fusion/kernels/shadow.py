@@ -28,6 +28,23 @@ FAULTY_M_S2 = 1.0  # error of the acceleration while the accelerometer is doubte
 
 
 @kernel
+def note_velocity(m: Record, w: Record) -> None:
+    """Keep the filter's velocity, before a step or a reading changes it, in ``w.v_before``."""
+    for i in range(3):
+        w.v_before[i] = m.x[0, VEL + i]
+
+
+@kernel
+def carry_shadow(t_ns: int, dt: float, m: Record, w: Record) -> None:
+    """Carry the shadow over the step of ``dt`` [s] that ended at ``t_ns``; before the first one, begin it."""
+    if m.t_block == 0:
+        start_shadow(m)
+        m.t_block = t_ns
+    if dt > 0.0:
+        step_shadow(dt, w.v_before, m)
+
+
+@kernel
 def start_shadow(m: Record) -> None:
     """Begin where the filter is."""
     m.shadow_q = FAULTY_M_S2 * FAULTY_M_S2

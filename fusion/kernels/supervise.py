@@ -22,7 +22,7 @@ from axialnav.fusion.kernels.measure import BLUR, FLOW, UWB_POSITION
 from axialnav.fusion.kernels.reanchor import FLOW_FRESH_S, move_position
 from axialnav.fusion.kernels.shadow import draw_shadow, recover_velocity
 from axialnav.fusion.kernels.update import is_uwb
-from axialnav.fusion.memory import BLOCKS
+from axialnav.fusion.memory import BLOCK_S, BLOCKS
 from axialnav.fusion.supervisor import SourceState
 from axialnav.models.jit import Record, Records
 from axialnav.models.rotations import matrix_from_quaternion
@@ -32,6 +32,7 @@ from axialnav.models.state import E_POS, POS, QUAT
 Array = NDArray[np.float64]
 OFF, ALIGNING, OK = int(SourceState.OFF), int(SourceState.ALIGNING), int(SourceState.OK)
 SUSPECT, REACQUIRE, LOST = int(SourceState.SUSPECT), int(SourceState.REACQUIRE), int(SourceState.LOST)
+BLOCK_NS = round(BLOCK_S * 1e9)
 ALIGN_S = 1.0
 TORN_BLOCKS = 2
 REFUSED_TRUST, GOOD_TRUST = 0.15, 0.5
@@ -40,6 +41,13 @@ SIGMAS = 2.0
 FUSED_S = 1.0
 NOT_TRUSTED_S = 0.3
 UNFIT_S = 3.0  # a place that does not fit for so long is doubted even if single readings pass
+
+
+@kernel
+def end_block(t_ns: int, sources: Records, memory: Records, m: Record, w: Record, c: Record) -> None:
+    """Close the block if it is over and somebody supervises."""
+    if t_ns - m.t_block >= BLOCK_NS and c.supervised > 0.0:
+        close_block(t_ns, sources, memory, m, w, c)
 
 
 @kernel

@@ -48,13 +48,6 @@ def redescend(nis_per_axis: float, soft_nis: float) -> float:
 
 
 @kernel
-def obstructed(power_difference_db: float, c: Record) -> float:
-    """Factor on the variance of a range whose total power exceeds that of its first path; NaN: not reported, 1."""
-    excess = (power_difference_db - c.nlos_db) / c.nlos_scale_db
-    return 1.0 + excess * excess if excess > 0.0 else 1.0
-
-
-@kernel
 def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
     """Try one reading on filter ``row``; leave its record in ``w.row`` (11,) and return its log-likelihood, in a trial.
 
@@ -74,8 +67,6 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     w.would = 0.0
     if axes < 0:
         return 0.0
-    if s.kind == UWB_RANGE:
-        w.variance[0] *= obstructed(values[3] - values[4], c)
     repeated = w.repeated
     nis, det = _innovate(axes, repeated, P, w)
     if not np.isfinite(nis):

@@ -50,6 +50,7 @@ def test_push_gives_the_bits_of_the_replay(imu: bool) -> None:
     assert state.t_ns == track.t_ns[-1]
     np.testing.assert_array_equal(state.position_m, track.position_m[-1])
     np.testing.assert_array_equal(state.velocity_m_s, track.velocity_m_s[-1])
+    assert [int(s) for s in state.source_states.values()] == track.source_states[-1].tolist()
     assert state.axial_velocity_m_s == pytest.approx(track.velocity_m_s[-1, 0])
     assert state.sigma_axial_velocity_m_s == pytest.approx(np.sqrt(track.velocity_covariance[-1, 0, 0]))
     assert sum(o.verdict is Verdict.FUSED for o in outcomes) > 0.5 * len(outcomes)
