@@ -11,6 +11,7 @@ carries a stamp of all source files of the package, and an index that cannot be 
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -44,6 +45,23 @@ class _PackageCacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
     def __init__(self, cache_path: str, filename_base: str) -> None:
         super().__init__(cache_path, filename_base, _STAMP)
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep one overload, while another process may be doing the same.
+
+        numba numbers the files in the order in which they come and writes the index first, so that two processes that
+        start together take the same number for different overloads.
+        """
+        number = hashlib.sha256(repr(key).encode()).digest()[:8]
+        name = self._data_name(int.from_bytes(number))
+        self._save_data(name, (self._source_stamp, data))
+        self._save_index({**self._load_index(), key: name})
+
+    def _load_data(self, name: str) -> Any:
+        stamp, data = super()._load_data(name)
+        if stamp != self._source_stamp:
+            raise FileNotFoundError(name)  # which numba takes for what it is: nothing there
+        return data
 
     def _load_index(self) -> Any:
         try:

@@ -157,6 +157,8 @@ class PartLowering(typed_passes.NativeLowering):  # type: ignore[misc]
     def run_pass(self, state: Any) -> bool:
         """Write the kernel's LLVM module and make it callable from other kernels."""
         target, function = state.targetctx, state.func_id
+        # numba numbers functions as they come, but one process links what another has kept: names have to be the same
+        function.unique_id = function.firstlineno
         state.library = PartLibrary(target.codegen(), function.func_qualname)
         state.library.call = function.modname, function.func_qualname, tuple(state.args)
         state.flags.no_compile = True
