@@ -47,11 +47,14 @@ class Residual:
 
 
 def bend_significance(fit: Fit) -> float:
-    """Score test of an acceleration at a fit without one: squared, in units of its variance [-]."""
+    """An acceleration in units of its standard deviation, squared [-]: score test at a fit without one, else Wald's."""
     frames = fit.score.shape[1]
-    if frames < 3 or len(fit.motion) != 1:
+    if frames < 3:
         return 0.0
     basis = motion_basis(frames, True)
+    if len(fit.motion) == 2:
+        J = basis.T @ fit.information.sum(axis=0) @ basis
+        return float(fit.motion[1] ** 2 * (J[1, 1] - J[0, 1] ** 2 / J[0, 0])) / WINDOW_VARIANCE
     chi2 = _chi2(fit, np.ascontiguousarray(basis[:, :1]), np.ascontiguousarray(basis[:, 1:]))[0]
     return max(chi2, 0.0) / WINDOW_VARIANCE
 

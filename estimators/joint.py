@@ -16,16 +16,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.positions import climb, coherent_power, motion_basis, position_scores
+from axialnav.estimators.positions import (
+    climb,
+    coherent_power,
+    motion_basis,
+    parameter_covariance,
+    position_gains,
+    position_scores,
+)
 from axialnav.estimators.products import Products
 from axialnav.estimators.spectrum import pair_count
 from axialnav.estimators.texture import blur_power, matched_weight, sharp_family, smooth_spectra
 
 Array = NDArray[np.float64]
 LIMITS = np.array([0.3, 1e-4, 4.0])  # longest Newton step and the one that ends the climb [px], number of steps
-PRIOR_DOF = 6.0
-BENDS_PX = tuple(0.125 * k for k in range(-16, 17))
+BENDS_PX = 0.125 * np.arange(-16, 17)
 WINDOW_VARIANCE = 1.6
+SHRINKAGE = np.array([6.0, WINDOW_VARIANCE])  # pseudo degrees of freedom, and variance towards which they draw
 
 
 @dataclass(frozen=True)
@@ -107,48 +114,16 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
         if not climb(sums.re, sums.im, weight.astype(np.float32), omega, basis, products.offset_px, motion, LIMITS):
             return None
     score, information, coherence = evaluate(products, weight, basis @ motion - products.offset_px)
-    J = basis.T @ information.sum(axis=0) @ basis
-    determinant = J[0, 0] if len(J) == 1 else J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
-    if not (0.0 < J[0, 0] < np.inf and 0.0 < determinant < np.inf):
+    covariance = np.empty((len(motion), len(motion)))
+    if not parameter_covariance(score, information, basis, SHRINKAGE, covariance):
         return None
-    covariance = sandwich(score @ basis, J)
     return Fit(motion, covariance, score, information, coherence, texture, noise, weight, coherent)
-
-
-def sandwich(score: Array, J: Array) -> Array:
-    r"""Covariance of the parameters from the spread of the strips' scores.
-
-    .. math:: J^{-1} \, \frac{\nu M + \nu_0 \, \gamma J}{\nu + \nu_0} \, J^{-1}, \qquad
-        M = \frac{S}{S - 1} \sum_s (g_s - \bar g)(g_s - \bar g)^T
-
-    with :math:`\nu = S - 1`, shrunk with :math:`\nu_0` pseudo degrees of freedom towards the model's own information
-    times the loss :math:`\gamma` of the window.
-
-    Parameters
-    ----------
-    score
-        Of every strip, shape (s, m).
-    J
-        Information, shape (m, m).
-    """
-    strips = score.shape[0]
-    spread = score - score.mean(axis=0)
-    meat = spread.T @ spread * strips / max(strips - 1, 1)
-    free = strips - 1
-    middle = (free * meat + PRIOR_DOF * WINDOW_VARIANCE * J) / (free + PRIOR_DOF)
-    inverse = np.linalg.inv(J)
-    return np.asarray(inverse @ middle @ inverse)
 
 
 def best_bend(products: Products, fit: Fit) -> float:
     """Change of the displacement per frame [px] from a coarse look around a fit without one."""
-    basis, sums, omega = motion_basis(products.frames, True), products.total, products.band.omega()
-    pairs = np.empty(sums.power.shape, dtype=np.float32)
-
-    def gain(bend: float) -> float:
-        """Log-likelihood of a bend, less that of unrelated frames."""
-        position = basis @ np.array([fit.motion[0], bend]) - products.offset_px
-        coherent_power(sums.re, sums.im, omega, position, pairs)
-        return float(np.sum(fit.weight * pairs))
-
-    return max(BENDS_PX, key=gain)
+    basis, sums = motion_basis(products.frames, True), products.total
+    position = basis[:, 0] * fit.motion[0] + BENDS_PX[:, None] * basis[:, 1] - products.offset_px
+    gain = np.empty(len(BENDS_PX))
+    position_gains(sums.re, sums.im, fit.weight.astype(np.float32), products.band.omega(), position, gain)
+    return float(BENDS_PX[int(np.argmax(gain))])

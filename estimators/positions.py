@@ -38,7 +38,7 @@ def turns(omega: Array, position: Array, cosine: Plane, sine: Plane) -> None:
 
 
 @kernel
-def _relative(cosine: Plane, sine: Plane, i: int, j: int, c: Plane, d: Plane) -> None:
+def relative_turn(cosine: Plane, sine: Plane, i: int, j: int, c: Plane, d: Plane) -> None:
     """``exp(i w (x_i - x_j))`` for every frequency."""
     a, b, x, y = cosine[i], sine[i], cosine[j], sine[j]
     for f in range(c.shape[0]):
@@ -103,7 +103,7 @@ def position_scores(
     p = 0
     for i in range(frames):
         for j in range(i + 1, frames):
-            _relative(cosine, sine, i, j, c, d)
+            relative_turn(cosine, sine, i, j, c, d)
             for s in range(strips):
                 sum_re[:] = np.float32(0.0)
                 sum_im[:] = np.float32(0.0)
@@ -125,6 +125,104 @@ def position_scores(
 def _add_weighted(values: Plane, weight: Plane, total: Plane) -> None:
     for f in range(total.shape[0]):
         total[f] += values[f] * weight[f]
+
+
+@kernel
+def _add_classes(values: Plane, weight: Plane, total: Plane) -> None:
+    """Add the classes of ``values`` (c, p, f), weighted, to ``total`` (p, f)."""
+    for k in range(values.shape[0]):
+        for p in range(values.shape[1]):
+            _add_weighted(values[k, p], weight[k], total[p])
+
+
+@kernel
+def position_gains(re: Plane, im: Plane, weight: Plane, omega: Array, positions: Array, out: Array) -> None:
+    """``sum_f w Re E`` over all pairs for each of some ``positions`` (b, n) [px] of the frames, ``out`` (b,).
+
+    Pair products of all strips together ``re``, ``im`` (c, p, f); ``weight`` (c, f); ``omega`` (f,) [rad/px], evenly
+    spaced.
+    """
+    pairs, count = re.shape[1:]
+    frames = positions.shape[1]
+    sum_re, sum_im = np.zeros((pairs, count), dtype=np.float32), np.zeros((pairs, count), dtype=np.float32)
+    _add_classes(re, weight, sum_re)
+    _add_classes(im, weight, sum_im)
+    cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
+    c, d = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    total = np.empty(count, dtype=np.float32)
+    for b in range(positions.shape[0]):
+        turns(omega, positions[b], cosine, sine)
+        total[:] = np.float32(0.0)
+        p = 0
+        for i in range(frames):
+            for j in range(i + 1, frames):
+                relative_turn(cosine, sine, i, j, c, d)
+                _add_real(sum_re[p], sum_im[p], c, d, total)
+                p += 1
+        _fold(total)
+        out[b] = total[0]
+
+
+@kernel
+def parameter_covariance(score: Array, information: Array, basis: Array, looks: Array, covariance: Array) -> bool:
+    r"""Covariance of the parameters from the spread of the strips' scores; False if the likelihood has no maximum.
+
+    .. math:: J^{-1} \, \frac{\nu M + \nu_0 \, \gamma J}{\nu + \nu_0} \, J^{-1}, \qquad
+        M = \frac{S}{S - 1} \sum_s (g_s - \bar g)(g_s - \bar g)^T
+
+    with :math:`\nu = S - 1`, shrunk with :math:`\nu_0` pseudo degrees of freedom towards the model's own information
+    times the loss :math:`\gamma` of the window.
+
+    Parameters
+    ----------
+    score, information
+        Of the frames' positions in every strip, shapes (s, n) and (s, n, n).
+    basis
+        Positions per parameter, shape (n, m), m <= 2.
+    looks
+        :math:`\nu_0` and :math:`\gamma`.
+    covariance
+        Result, shape (m, m).
+    """
+    strips, many = score.shape[0], basis.shape[1]
+    g, part = np.empty((strips, many)), np.empty((many, many))
+    J, middle, mean = np.zeros((many, many)), np.zeros((many, many)), np.zeros(many)
+    for s in range(strips):
+        _project(basis, score[s], information[s], g[s], part)
+        J += part
+        mean += g[s] / strips
+    inverse = _small_inverse(J)
+    if not (inverse[0, 0] > 0.0 and np.isfinite(inverse[0, 0]) and inverse[many - 1, many - 1] > 0.0):
+        return False
+    free = max(strips - 1, 0)
+    share = 0.0 if free == 0 else free * strips / max(strips - 1, 1) / (free + looks[0])
+    for a in range(many):
+        for b in range(many):
+            for s in range(strips):
+                middle[a, b] += share * (g[s, a] - mean[a]) * (g[s, b] - mean[b])
+            middle[a, b] += looks[0] * looks[1] * J[a, b] / (free + looks[0])
+    covariance[:] = 0.0
+    for a in range(many):
+        for b in range(many):
+            for c in range(many):
+                for e in range(many):
+                    covariance[a, b] += inverse[a, c] * middle[c, e] * inverse[e, b]
+    return True
+
+
+@kernel
+def _small_inverse(J: Array) -> Array:
+    """Inverse of a matrix (m, m), m <= 2; not a number where it is not positive definite."""
+    inverse = np.full(J.shape, np.nan)
+    if J.shape[0] == 1:
+        if J[0, 0] > 0.0:
+            inverse[0, 0] = 1.0 / J[0, 0]
+        return inverse
+    determinant = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+    if J[0, 0] > 0.0 and determinant > 0.0:
+        inverse[0, 0], inverse[1, 1] = J[1, 1] / determinant, J[0, 0] / determinant
+        inverse[0, 1], inverse[1, 0] = -J[0, 1] / determinant, -J[1, 0] / determinant
+    return inverse
 
 
 @kernel
@@ -150,12 +248,10 @@ def climb(
     limits
         Longest step [px], step that ends the search [px], number of steps.
     """
-    classes, pairs, count = re.shape
+    pairs, count = re.shape[1:]
     sum_re, sum_im = np.zeros((1, 1, pairs, count), dtype=np.float32), np.zeros((1, 1, pairs, count), dtype=np.float32)
-    for k in range(classes):
-        for p in range(pairs):
-            _add_weighted(re[k, p], weight[k], sum_re[0, 0, p])
-            _add_weighted(im[k, p], weight[k], sum_im[0, 0, p])
+    _add_classes(re, weight, sum_re[0, 0])
+    _add_classes(im, weight, sum_im[0, 0])
     one = np.ones((1, count), dtype=np.float32)
     frames, many = basis.shape
     score, information = np.empty((1, frames)), np.empty((1, frames, frames))
@@ -238,7 +334,7 @@ def coherent_power(re: Plane, im: Plane, omega: Array, position: Array, out: Pla
     p = 0
     for i in range(frames):
         for j in range(i + 1, frames):
-            _relative(cosine, sine, i, j, c, d)
+            relative_turn(cosine, sine, i, j, c, d)
             for k in range(re.shape[0]):
                 _add_real(re[k, p], im[k, p], c, d, out[k])
             p += 1

@@ -14,6 +14,7 @@ from axialnav.estimators.products import Products
 from axialnav.estimators.roll import roll_step, unrolled
 from axialnav.estimators.window import FrameWindow
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 MAX_ROLL_STEPS = 4
 DRIFT_SHARE = 1.0  # of a bin: drift over the whole window that is worth following
@@ -60,33 +61,42 @@ def fit_strips(products: Products, start_px: float, exposure_ratio: float, conse
     consensus
         Whether strips may be left out.
     """
-    fit = fit_frames(products, start_px, exposure_ratio, passes=2)
+    fit = fit_frames(products, np.array([start_px]), exposure_ratio, passes=2)
     lost = 0
-    for doubt in (disturbed, _no_roll) if consensus else ():
-        bad = doubt(fit, products) if fit is not None else np.zeros(0, dtype=np.bool_)
+    for doubt in (_undisturbed, _unrolled) if consensus else ():
+        if fit is None:
+            return fit, lost
+        products, fit, bad = doubt(products, fit, exposure_ratio)
         lost += int(bad.sum())
         if fit is None or lost > MAX_LOST_STRIPS:
             return fit, lost
         if bad.any():
             products = products.selected(~bad)
-            fit = fit_frames(products, float(fit.motion[0]), exposure_ratio)
+            fit = fit_frames(products, fit.motion, exposure_ratio)
     products, fit = _level(products, fit, exposure_ratio)
     products, fit = _unpatterned(products, fit, exposure_ratio)
     bad = quarrelling(fit, products) if fit is not None and consensus else np.zeros(0, dtype=np.bool_)
     lost += int(bad.sum())
     if fit is None or not bad.any() or lost > MAX_LOST_STRIPS:
         return fit, lost
-    return fit_frames(products.selected(~bad), float(fit.motion[0]), exposure_ratio), lost
+    return fit_frames(products.selected(~bad), fit.motion, exposure_ratio), lost
 
 
-def _no_roll(fit: Fit, products: Products) -> Mask:
-    """Strips that quarrel with the others in a way that no roll of the camera explains."""
+def _undisturbed(products: Products, fit: Fit, exposure_ratio: float) -> tuple[Products, Fit | None, Mask]:
+    """Products and fit as they are, and the strips that something fixed to the camera disturbs."""
+    return products, fit, disturbed(fit, products)
+
+
+def _unrolled(products: Products, fit: Fit, exposure_ratio: float) -> tuple[Products, Fit | None, Mask]:
+    """Strips that quarrel with the others; if a roll explains them, none, and products and fit without it."""
     bad = quarrelling(fit, products)
     if not bad.any() or roll_step(fit, products.height) is None:
-        return bad
-    levelled, level = _level(products, fit, 0.0)
+        return products, fit, bad
+    levelled, level = _level(products, fit, exposure_ratio)
     explained = level is not None and not quarrelling(level, levelled).any()
-    return np.zeros_like(bad) if explained or int(bad.sum()) > MAX_LOST_STRIPS else bad
+    if explained or int(bad.sum()) > MAX_LOST_STRIPS:
+        return levelled, level, np.zeros_like(bad)
+    return products, fit, bad
 
 
 def _level(products: Products, fit: Fit | None, exposure_ratio: float) -> tuple[Products, Fit | None]:
@@ -96,7 +106,7 @@ def _level(products: Products, fit: Fit | None, exposure_ratio: float) -> tuple[
         if fit is None or shift is None:
             break
         products = unrolled(products, shift)
-        fit = fit_frames(products, float(fit.motion[0]), exposure_ratio)
+        fit = fit_frames(products, fit.motion, exposure_ratio)
     return products, fit
 
 
@@ -108,13 +118,21 @@ def _unpatterned(products: Products, fit: Fit | None, exposure_ratio: float) -> 
     if power <= SURE * sigma:
         return products, fit
     products = without_pattern(products, power)
-    return products, fit_frames(products, float(fit.motion[0]), exposure_ratio)
+    return products, fit_frames(products, fit.motion, exposure_ratio)
 
 
-def fit_frames(products: Products, start_px: float, exposure_ratio: float, passes: int = 1) -> Fit | None:
-    """Displacement alone, then with an acceleration if that is significant."""
-    fit = fit_motion(products, np.array([start_px]), exposure_ratio, passes)
+def fit_frames(products: Products, start: Array, exposure_ratio: float, passes: int = 1) -> Fit | None:
+    """Displacement alone, or with an acceleration if that is significant.
+
+    ``start`` is that of :func:`~axialnav.estimators.joint.fit_motion`; an acceleration in it was significant in a fit
+    to nearly the same products, and is fitted at once.
+    """
+    if len(start) == 2:
+        fit = fit_motion(products, start, exposure_ratio, passes)
+        if fit is not None and bend_significance(fit) >= SURE_BEND:
+            return fit
+    fit = fit_motion(products, start[:1], exposure_ratio, passes)
     if fit is None or bend_significance(fit) < SURE_BEND:
         return fit
-    start = np.array([float(fit.motion[0]), best_bend(products, fit)])
-    return fit_motion(products, start, exposure_ratio) or fit
+    bent = np.array([float(fit.motion[0]), best_bend(products, fit)])
+    return fit_motion(products, bent, exposure_ratio) or fit

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from axialnav.estimators.extra import extra_step
 from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
-from axialnav.estimators.positions import free_positions, motion_basis
+from axialnav.estimators.positions import free_positions, motion_basis, relative_turn, turns
 from axialnav.estimators.products import Products
 from axialnav.models.jit import kernel
 
@@ -41,25 +41,31 @@ def roll_step(fit: Fit, height: Array) -> Array | None:
 def unrolled(products: Products, shift_px: Array) -> Products:
     """The products as if frame k had not been rolled by ``shift_px[k]`` at height 1."""
     re, im = products.re.copy(), products.im.copy()
-    _turn(re, im, 2.0 * np.pi * products.band.frequency(), products.height, shift_px)
+    _turn(re, im, products.band.omega(), products.height, shift_px)
     return replace(products, re=re, im=im)
 
 
 @kernel
 def _turn(re: Plane, im: Plane, omega: Array, height: Array, shift: Array) -> None:
     """Multiply products (s, c, p, f) by ``exp(i w y_s (x_i - x_j))``."""
-    strips, classes, _, count = re.shape
-    frames = shift.shape[0]
-    for s in range(strips):
+    frames, count = shift.shape[0], omega.shape[0]
+    cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
+    c, d = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    for s in range(re.shape[0]):
+        turns(omega, height[s] * shift, cosine, sine)
         p = 0
         for i in range(frames):
             for j in range(i + 1, frames):
-                for f in range(count):
-                    angle = omega[f] * height[s] * (shift[i] - shift[j])
-                    c = np.float32(np.cos(angle))
-                    d = np.float32(np.sin(angle))
-                    for k in range(classes):
-                        a, b = re[s, k, p, f], im[s, k, p, f]
-                        re[s, k, p, f] = a * c - b * d
-                        im[s, k, p, f] = a * d + b * c
+                relative_turn(cosine, sine, i, j, c, d)
+                for k in range(re.shape[1]):
+                    _rotate(re[s, k, p], im[s, k, p], c, d)
                 p += 1
+
+
+@kernel
+def _rotate(re: Plane, im: Plane, c: Plane, d: Plane) -> None:
+    """Multiply ``re + i im`` (f,) by ``c + i d``."""
+    for f in range(c.shape[0]):
+        a, b = re[f], im[f]
+        re[f] = a * c[f] - b * d[f]
+        im[f] = a * d[f] + b * c[f]

@@ -9,6 +9,7 @@ what does not move with the wall.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -50,12 +51,19 @@ class Band:
         return self.last - self.first
 
     def frequency(self) -> Array:
-        """Frequencies [cycles/px], shape (count,)."""
-        return np.arange(self.first, self.last, dtype=np.float64) / self.length
+        """Frequencies [cycles/px], shape (count,), shared: not to be written to."""
+        return _frequencies(self)[0]
 
     def omega(self) -> Array:
-        """Frequencies [rad/px], shape (count,)."""
-        return 2.0 * np.pi * self.frequency()
+        """Frequencies [rad/px], shape (count,), shared: not to be written to."""
+        return _frequencies(self)[1]
+
+
+@lru_cache(maxsize=64)
+def _frequencies(band: Band) -> tuple[Array, Array]:
+    """Frequencies of a band in cycles and in radians per pixel."""
+    cycles = np.arange(band.first, band.last, dtype=np.float64) / band.length
+    return cycles, 2.0 * np.pi * cycles
 
 
 def pair_count(frames: int) -> int:

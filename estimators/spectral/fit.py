@@ -27,6 +27,7 @@ SAME = 0.01
 SEPARATE, SEPARATE_PX = 0.1, 0.3
 PRIOR_DOF, TINY, RIDGE = 6.0, 1e-12, 1e-9
 CLIMB_REACH = 1.3  # climbs that choose among starts see the ripples of that many times the farthest copies
+CLEAR_GAP = 30.0  # groups of bins are too coarse to tell apart what is nearer
 SHORTER = (1.0, 0.8)  # of a displacement: where to look for one with a frame missing
 MISFIT = 1.25  # the spectra of walls are only nearly smooth; measured on photographs
 
@@ -147,11 +148,16 @@ def best_displacement(spectra: Spectra, usable: Mask, frames: int, ratio: float,
     farthest = CLIMB_REACH * (frames - 1 + ratio) * max(float(theta[SHIFT]) for theta in found)
     problem = pose(spectra, usable, frames, farthest)
     tops, rivals = _best(problem, found, ratio, SHIFT)
-    theta, _ = exact.climb(tops[0], ratio, _free(SHIFT), STEPS)
+    theta, cost = exact.climb(tops[0], ratio, _free(SHIFT), STEPS)
     fit = conclude(spectra, exact, theta, ratio, SHIFT, rivals)
     least = min(rival.cost for rival in rivals)
-    gapped = [_gapped(problem, times, ratio, tops[:2]) for times in with_gaps(frames)]
-    return replace(fit, gap=max(((least - cost) * fit.per_look for cost in gapped), default=-math.inf))
+    gapped = [(times, *_gapped(problem, times, ratio, tops[:2])) for times in with_gaps(frames)]
+    gap = max(((least - other) * fit.per_look for _, _, other in gapped), default=-math.inf)
+    if gap > -CLEAR_GAP:
+        uneven = [(replace(exact, lags=pair_lags(times)), near) for times, near, _ in gapped]
+        others = (copies.climb(near, ratio, _free(SHIFT), STEPS)[1] for copies, near in uneven)
+        gap = max((cost - other) * fit.per_look for other in others)
+    return replace(fit, gap=gap)
 
 
 def with_gaps(frames: int) -> list[tuple[int, ...]]:
@@ -159,13 +165,13 @@ def with_gaps(frames: int) -> list[tuple[int, ...]]:
     return [tuple(k + (k >= gap) for k in range(frames)) for gap in range(1, frames // 2 + 1) if frames > 2]
 
 
-def _gapped(even: Problem, times: tuple[int, ...], ratio: float, near: list[Array]) -> float:
-    """Misfit per row of copies at uneven ``times``."""
+def _gapped(even: Problem, times: tuple[int, ...], ratio: float, near: list[Array]) -> tuple[Array, float]:
+    """Parameters of copies at uneven ``times``, and their misfit per row."""
     problem = replace(even, lags=pair_lags(times))
     starts = [theta.copy() for theta in near for _ in SHORTER]
     for start, share in zip(starts, SHORTER * len(near), strict=True):
         start[SHIFT] *= share
-    return min(problem.climb(start, ratio, _free(SHIFT), SHORT_STEPS)[1] for start in starts)
+    return min((problem.climb(start, ratio, _free(SHIFT), SHORT_STEPS) for start in starts), key=lambda found: found[1])
 
 
 def free_blur(spectra: Spectra, usable: Mask, frames: int, near: Fit) -> Fit:

@@ -11,7 +11,8 @@ from axialnav.estimators.spectral.fit import Fit
 
 MIN_MARGIN, MIN_LIGHT = 12.0, 3.0  # noise among all lengths wins by 7 in one picture of fifty
 MAX_EXCESS = 10.0  # pictures that are no walls and codecs reach 8
-MAX_GAP, GAP_SHARE = 1.5, 0.13  # of the margin: slow combs, half a ridge in view, look alike with a frame missing
+MAX_GAP, MIN_EVEN = 3.0, 3.0
+EVEN_SHARE = 0.03  # of the margin: slow combs, half a ridge in view, look alike with a frame missing, up to half of it
 MAX_SHARE, MAX_SIGMA_PX = 0.1, 0.5
 
 
@@ -30,8 +31,9 @@ def _same(a: Image, b: Image) -> bool:
 def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
     """Why a fit is not believed; "" if it is.
 
-    It must beat every other length, no motion among them, and a missing frame; show light beyond its first dark line;
-    and be longer than what can be told from a lens.  What the model does not explain makes likelihoods count less.
+    It must beat every other length, no motion among them, and a missing frame, which would change the length by a fifth
+    or more; show light beyond its first dark line; and be longer than what can be told from a lens.  What the model
+    does not explain makes likelihoods count less.
     """
     if not (math.isfinite(fit.sigma_px) and math.isfinite(length_px)):
         return MotionReason.AMBIGUOUS
@@ -40,8 +42,8 @@ def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
         return MotionReason.AMBIGUOUS
     if fit.excess > MAX_EXCESS:
         return MotionReason.MODEL
-    if fit.gap > MAX_GAP * deflated + GAP_SHARE * fit.margin:
-        return MotionReason.UNEVEN
+    if fit.gap > -MIN_EVEN * deflated - EVEN_SHARE * fit.margin:
+        return MotionReason.UNEVEN if fit.gap > MAX_GAP * deflated else MotionReason.AMBIGUOUS
     if length_px < shortest_px:
         return MotionReason.SHORT
     return MotionReason.SIGMA if fit.sigma_px > min(MAX_SHARE * length_px, MAX_SIGMA_PX) else ""

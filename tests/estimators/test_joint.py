@@ -7,6 +7,7 @@ import pytest
 
 from axialnav.estimators.estimate import MotionEstimate, MotionReason, estimate_motion
 from axialnav.estimators.measure import JointOptions, measure_joint
+from axialnav.estimators.refine import fit_frames
 from axialnav.estimators.window import FrameWindow
 from axialnav.replay.simulate.render import Rendering, dropped_frame
 from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered
@@ -64,6 +65,19 @@ def test_acceleration_is_fitted_where_it_shows_and_only_there() -> None:
     assert bent.displacement_px == pytest.approx(9.0, abs=0.04)
     straight = estimate_motion(rendered(9.0, 6).frames, frame_period_s=PERIOD_S)
     assert straight.acceleration_px == 0.0
+
+
+def test_an_acceleration_known_from_before_is_kept_or_given_up_as_the_frames_say() -> None:
+    """The answer does not depend on whether the fit begins with an acceleration."""
+    for picture in (rendered(9.0, 6, acceleration_px=1.0), rendered(9.0, 6)):
+        window = FrameWindow(*picture.frames[0].shape, 5, picture.frames.dtype)
+        for frame in picture.frames:
+            window.push(frame)
+        products = window.following(9.0)
+        cold, warm = (fit_frames(products, np.array(start), 0.3, 2) for start in ([9.0], [9.0, 0.9]))
+        assert cold is not None
+        assert warm is not None
+        np.testing.assert_allclose(warm.motion, cold.motion, atol=0.3 * np.sqrt(cold.covariance[0, 0]))
 
 
 @pytest.mark.parametrize("place", [0, 1, 2, 3])

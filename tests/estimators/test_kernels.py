@@ -11,7 +11,17 @@ import pytest
 from axialnav.estimators.extra import extra_step
 from axialnav.estimators.layout import BANDS, STRIPS, RowLayout, binned_coefficients, remove_level
 from axialnav.estimators.occlusion import OccluderFinder
-from axialnav.estimators.positions import climb, coherent_power, free_positions, motion_basis, position_scores
+from axialnav.estimators.positions import (
+    climb,
+    coherent_power,
+    free_positions,
+    motion_basis,
+    parameter_covariance,
+    position_gains,
+    position_scores,
+)
+from axialnav.estimators.products import Products
+from axialnav.estimators.roll import unrolled
 from axialnav.estimators.rows import bin_columns, fast_length, padded_length, row_sums, sum_rows
 from axialnav.estimators.search import LagTransform
 from axialnav.estimators.spectrum import Band, add_power, pair_count, pair_frames, pair_products, row_spectra
@@ -195,6 +205,46 @@ def test_coherent_power_and_the_search_agree_with_brute_force() -> None:
     out = np.empty((1, band.count), dtype=np.float32)
     coherent_power(p_re, p_im, omega, 1.5 * np.arange(FRAMES), out)
     assert 2.0 * out.sum() == pytest.approx(_likelihood(re, im, omega, weight, 1.5 * np.arange(FRAMES)), rel=1e-3)
+
+
+def test_gains_of_positions_are_the_brute_force_likelihood() -> None:
+    re, im, band = _spectra(12)
+    omega, rng = band.omega(), np.random.default_rng(13)
+    weight, positions, gain = rng.uniform(0.5, 1.5, band.count), rng.normal(size=(7, FRAMES)), np.empty(7)
+    p_re, p_im = _weighted_products(re, im, np.ones(band.count))
+    halves = [np.concatenate([0.5 * p, 0.5 * p]) for p in (p_re, p_im)]  # two classes of rows
+    position_gains(*halves, np.tile(weight.astype(np.float32), (2, 1)), omega, positions, gain)
+    brute = np.array([_likelihood(re, im, omega, weight, x) for x in positions])
+    np.testing.assert_allclose(2.0 * gain, brute, rtol=1e-3, atol=1e-4 * np.abs(brute).max())
+
+
+def test_products_without_roll_are_those_of_spectra_without_it() -> None:
+    """GIVEN spectra turned as a roll turns them WHEN it is taken out THEN the products of the others are left."""
+    band, rng, height = Band(128), np.random.default_rng(14), np.array([-0.8, 0.1, 0.7])
+    y = rng.normal(size=(3, FRAMES, band.count)) + 1j * rng.normal(size=(3, FRAMES, band.count))
+    shift = np.array([0.4, -0.2, 0.0, 0.3])
+    rolled = y * np.exp(-1j * band.omega() * height[:, None, None] * shift[:, None])
+    i, j = pair_frames(FRAMES).T
+    level, seen = (z[:, i] * z[:, j].conj() for z in (y, rolled))
+    products = Products(
+        seen.real.astype(np.float32)[:, None], seen.imag.astype(np.float32)[:, None],
+        np.zeros((3, 1, band.count), dtype=np.float32), np.zeros(FRAMES), band, 128, np.ones((3, 1)), height,
+    )  # fmt: skip
+    found = unrolled(products, shift)
+    np.testing.assert_allclose(found.re[:, 0] + 1j * found.im[:, 0], level, atol=1e-4)
+
+
+@pytest.mark.parametrize("accelerated", [False, True])
+def test_covariance_of_the_parameters_is_the_shrunk_sandwich(accelerated: bool) -> None:
+    rng, basis = np.random.default_rng(15), motion_basis(5, accelerated)
+    root, score = rng.normal(size=(9, 5, 5)), rng.normal(size=(9, 5))
+    information, found = np.einsum("sij,skj->sik", root, root), np.empty((basis.shape[1],) * 2)
+    assert parameter_covariance(score, information, basis, np.array([6.0, 1.6]), found)
+    J = basis.T @ information.sum(axis=0) @ basis
+    meat = 9.0 * np.atleast_2d(np.cov((score @ basis).T))
+    inverse = np.linalg.inv(J)
+    np.testing.assert_allclose(found, inverse @ ((8.0 * meat + 6.0 * 1.6 * J) / 14.0) @ inverse, rtol=1e-9)
+    assert not parameter_covariance(score, -information, basis, np.array([6.0, 1.6]), found)
 
 
 def test_motion_basis_is_centred_and_orthogonal() -> None:

@@ -10,16 +10,17 @@ from axialnav.estimators.spectral import fit_composite, fit_single
 from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered
 
 SPEEDS_PX = np.geomspace(0.7, 45.0, 14)
+SLOW_PX = 2.5  # below, five even frames in dim light look like five with one missing
 
 
 def test_composites_are_read_at_every_speed_and_their_sigmas_are_true() -> None:
-    """Fourteen walls from 0.7 to 45 px per frame, both signs; dim light for every other one."""
+    """Fourteen walls from 0.7 to 45 px per frame, both signs, every other in dim light; slow ones may be refused."""
     told: list[tuple[float, MotionEstimate]] = []
     for seed, speed in enumerate(SPEEDS_PX):
         picture = rendered(float(speed) * (-1) ** seed, 900 + seed, bright=seed % 2 == 0, contrast=0.1)
         told.append((float(speed), fit_composite(picture.frames, PERIOD_S, EXPOSURE_S)))
     good = [(speed, e) for speed, e in told if e.accepted]
-    assert len(good) >= 12
+    assert [speed for speed, _ in good if speed > SLOW_PX] == [speed for speed in SPEEDS_PX if speed > SLOW_PX]
     error = np.array([e.displacement_px - speed for speed, e in good])
     z = error / np.array([e.sigma_px for _, e in good])
     assert np.median(np.abs(error)) < 0.02

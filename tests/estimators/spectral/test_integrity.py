@@ -48,6 +48,14 @@ def test_a_dropped_frame_is_refused(displacement_px: float, gap: int) -> None:
     assert not fit_composite(picture.frames, PERIOD_S, EXPOSURE_S).accepted
 
 
+@pytest.mark.parametrize(("bright", "displacement_px"), [(True, 0.48), (True, 0.65), (False, 0.85), (False, 1.7)])
+def test_a_dropped_frame_of_a_slow_wall_is_refused(bright: bool, displacement_px: float) -> None:
+    """Half a ridge of the comb is in view: a frame is not known to be there unless its absence is ruled out."""
+    for gap in range(4):
+        picture = rendered(displacement_px, 730 + gap, bright=bright, contrast=0.05, frame_times=dropped_frame(5, gap))
+        assert not fit_composite(picture.frames, PERIOD_S, EXPOSURE_S).accepted
+
+
 def test_a_periodic_wall_is_refused_because_one_frame_has_a_comb_already() -> None:
     wall, refused = brick_wall(np.random.default_rng(77), tone=0.0, roughness=0.0), []
     camera = CameraModel(width=640, height=360, exposure_s=EXPOSURE_S, frame_period_s=PERIOD_S)
