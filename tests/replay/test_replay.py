@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
@@ -81,6 +82,18 @@ def test_progress_ends_at_one(run: Run) -> None:
     an.replay(run.flight, progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
+
+
+def test_compiling_does_not_count_as_time_of_the_filter(run: Run) -> None:
+    """The first replay after installation is no slower than the flight only because its kernels were compiled."""
+
+    def compile_one(_: float) -> None:
+        numba.njit(lambda x: x + 1.0)(1.0)
+
+    timing = an.replay(run.flight, progress=compile_one).metrics["timing"]
+    assert 0.0 < timing["compiled_s"] < timing["wall_s"]
+    own_s = timing["wall_s"] - timing["compiled_s"]
+    assert timing["real_time_factor"] == pytest.approx(timing["flight_s"] / own_s)
 
 
 @pytest.mark.parametrize(

@@ -189,7 +189,7 @@ def test_the_sender_is_killed_and_another_comes(tmp_path: Path) -> None:
             links[sensor].unlink()
             links[sensor].symlink_to(device)
         second.wait_for_start()
-        assert wait_for(lambda: node.output.sent > sent + 30, 10.0)
+        assert wait_for(lambda: node.output.sent > sent + 30, 30.0)
         status = node.status()
     finally:
         node.close()
