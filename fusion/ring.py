@@ -17,7 +17,6 @@ from axialnav.fusion.memory import MEMORY, SOURCE_MEMORY, Memory, Records, new_m
 Ints = NDArray[np.int64]
 Array = NDArray[np.float64]
 
-STRIDE: Final = 64  # events between snapshots: a late reading runs this many again at most, beside the later ones
 CAPACITY: Final = 1024
 
 HEAD: Final = np.dtype(
@@ -25,6 +24,7 @@ HEAD: Final = np.dtype(
         ("count", "i8"),  # events held
         ("free", "i8"),  # snapshots not in use
         ("reach_ns", "i8"),
+        ("stride", "i8"),  # events between snapshots: a late reading runs these again at most, and those behind it
         ("keep_from_ns", "i8"),  # events of the first window are kept while they are in reach
         ("trimmed", "i8"),  # whether anything has been forgotten yet
         ("aligned", "i8"),  # whether there is a state
@@ -84,7 +84,7 @@ class Ring(NamedTuple):
 
     def grown(self) -> Ring:
         """Copy with twice the room."""
-        larger = _allocate(2 * len(self.t_ns), self.memory)
+        larger = _allocate(2 * len(self.t_ns), self.memory, int(self.head["stride"][0]))
         n = int(self.head["count"][0])
         for new, old in zip(larger[:5], self[:5], strict=True):
             new[: min(n, len(old))] = old[: min(n, len(old))]
@@ -99,16 +99,16 @@ class Ring(NamedTuple):
         return larger
 
 
-def new_ring(n_sources: int, reach_ns: int) -> Ring:
+def new_ring(n_sources: int, reach_ns: int, stride: int) -> Ring:
     """Ring without events, of a filter that has not started."""
-    ring = _allocate(CAPACITY, new_memory(n_sources))
+    ring = _allocate(CAPACITY, new_memory(n_sources), stride)
     ring.head["reach_ns"] = reach_ns
     ring.head["keep_from_ns"] = -(2**62)
     return ring
 
 
-def _allocate(capacity: int, memory: Memory) -> Ring:
-    snapshots = capacity // STRIDE + 2
+def _allocate(capacity: int, memory: Memory, stride: int) -> Ring:
+    snapshots = capacity // stride + 2
     core_words = MEMORY.itemsize // 8
     words = core_words + len(memory.sources) * SOURCE_MEMORY.itemsize // 8
     live = np.zeros(words, np.int64)
@@ -125,5 +125,6 @@ def _allocate(capacity: int, memory: Memory) -> Ring:
         sources=live[core_words:].view(SOURCE_MEMORY),
         inbox=np.zeros(1, INBOX),
     )
+    ring.head["stride"] = stride
     ring.load(memory)
     return ring

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +34,12 @@ class Stream(ABC):
         How far behind the newest event a reading may come [ns].
     """
 
+    STRIDE: ClassVar[int]  # events between snapshots
+
     def __init__(self, n_sources: int, reach_ns: int) -> None:
         self._out = np.zeros((2, LOG_WIDTH))
         self.row = self._out[0].data  # of Python floats: quicker to read than an array
-        self.ring = new_ring(n_sources, reach_ns)
+        self.ring = new_ring(n_sources, reach_ns, self.STRIDE)
         self._use(self.ring)
 
     def push(self, t_ns: int, source: int, values: tuple[float, ...]) -> int:
@@ -74,6 +77,8 @@ class Stream(ABC):
 class CompiledStream(Stream):
     """Stream through the compiled kernel: one call a reading."""
 
+    STRIDE = 64  # a snapshot takes as long as a dozen events
+
     def __init__(self, sources: Records, settings: Records, reach_ns: int) -> None:
         self._sources, self._settings = sources, settings
         self._scratch, self._track = new_scratch(), np.zeros((1, TRACK_WIDTH))
@@ -95,6 +100,8 @@ class CompiledStream(Stream):
 
 class SteppedStream(Stream):
     """Stream through a filter in Python, one step an event."""
+
+    STRIDE = 8  # an event takes as long as a dozen snapshots
 
     def __init__(self, n_sources: int, reach_ns: int, step: Step) -> None:
         super().__init__(n_sources, reach_ns)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.events import WIDTH
 from axialnav.fusion.kernels.run import run
 from axialnav.fusion.memory import LOG_WIDTH, MEMORY, SCRATCH, SETTINGS, SOURCE_MEMORY, TRACK_WIDTH
-from axialnav.fusion.ring import HEAD, INBOX, STRIDE
+from axialnav.fusion.ring import HEAD, INBOX
 from axialnav.fusion.sources import SOURCE
 from axialnav.models.jit import Record, Records
 from axialnav.models.jit import kernel as array_kernel
@@ -152,8 +152,8 @@ def rewind(h: Record, slot: Ints, free: Ints, kept: Ints, live: Ints) -> int:
 
 @kernel
 def remember(index: int, h: Record, slot: Ints, free: Ints, kept: Ints, live: Ints) -> None:
-    """Keep the filter as it is before the event at ``index`` if the last snapshot is ``STRIDE`` events back."""
-    for e in range(index, max(index - STRIDE, -1), -1):
+    """Keep the filter as it is before the event at ``index`` if the last snapshot is a stride back."""
+    for e in range(index, max(index - h.stride, -1), -1):
         if slot[e] >= 0:
             return
     h.free -= 1
