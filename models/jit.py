@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., object])
 
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "cache": True}
+
 Record: TypeAlias = Any  # one element of a structured array inside a kernel: fields are attributes
 Records: TypeAlias = NDArray[np.void]
 Integer: TypeAlias = int | np.int64  # a literal int would be compiled as a constant of its own
@@ -72,19 +74,7 @@ class _PackageCacheFile(IndexDataCacheFile):  # type: ignore[misc]
 
 def kernel(function: F) -> F:
     """Compile ``function`` to machine code at first use and keep the result on disk until any source changes."""
-    return _compiled(function, nogil=False)
-
-
-def threaded_kernel(function: F) -> F:
-    """As :func:`kernel`, for long work: other threads of the process run meanwhile.
-
-    Not for flight: a thread that gives its turn away may wait milliseconds to get it back.
-    """
-    return _compiled(function, nogil=True)
-
-
-def _compiled(function: F, *, nogil: bool) -> F:
-    compiled: Any = numba.njit(cache=True, error_model="numpy", nogil=nogil)(function)
+    compiled: Any = numba.njit(**OPTIONS)(function)
     cache_with_stamp(compiled)
     result: F = compiled
     return result

@@ -11,12 +11,11 @@ from typing import Any, TypeVar
 
 import numba
 
-from axialnav.models.jit import cache_with_stamp
+from axialnav.models.jit import OPTIONS, cache_with_stamp
 
 F = TypeVar("F", bound=Callable[..., object])
 
 TRIED = (0, 61), (0, 68)  # oldest and newest numba whose inside is as expected; others compile as usual, slowly
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "cache": True}
 
 
 def kernel(function: F) -> F:
@@ -34,7 +33,7 @@ def threaded_kernel(function: F) -> F:
 
 def _compiled(function: F, *, nogil: bool) -> F:
     known = TRIED[0] <= numba.version_info.short <= TRIED[1]
-    compiled: Any = _in_one_module(function, nogil) if known else numba.njit(nogil=nogil, **_OPTIONS)(function)
+    compiled: Any = _in_one_module(function, nogil) if known else numba.njit(nogil=nogil, **OPTIONS)(function)
     cache_with_stamp(compiled)
     result: F = compiled
     return result
@@ -44,11 +43,11 @@ def _in_one_module(function: F, nogil: bool) -> Any:
     from axialnav.models.one_module import PartCacheImpl, PartCompiler, WholeCompiler
 
     # nothing is allocated, so nothing has to be counted
-    whole: Any = numba.njit(nogil=nogil, _nrt=False, pipeline_class=WholeCompiler, **_OPTIONS)(function)
+    whole: Any = numba.njit(nogil=nogil, _nrt=False, pipeline_class=WholeCompiler, **OPTIONS)(function)
     if whole is function:  # NUMBA_DISABLE_JIT=1
         return whole
     part: Any = numba.njit(
-        _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=PartCompiler, **_OPTIONS
+        _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=PartCompiler, **OPTIONS
     )(function)
     part._cache._impl = PartCacheImpl(function)
     cache_with_stamp(part, ".part")

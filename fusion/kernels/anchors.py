@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.fusion.kernels.kinematics import WINDOWS, way
+from axialnav.fusion.kernels.kinematics import WINDOWS, allowed_m, way
 from axialnav.fusion.kernels.locate import HEARD_S, NARROWEST_M, common_length
 from axialnav.fusion.kernels.measure import UWB_TDOA
 from axialnav.fusion.kernels.shadow import displacement_variance
@@ -145,5 +143,5 @@ def _excess(a: Integer, b: Integer, s: Record, seen: Record, m: Record, w: Recor
         apart = w.ways[k, a] - (w.ways[k, b] if b >= 0 else 0.0)
         if np.isfinite(apart):
             variance = displacement_variance(WINDOWS[k] * BLOCK_S, w.ray, m) + 0.5 * seen.scatter * seen.scatter
-            largest = max(largest, abs(apart) / (c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance)))
+            largest = max(largest, abs(apart) / allowed_m(variance, c))
     return float(largest)

@@ -54,6 +54,12 @@ def directions(c: Record, U: Array) -> None:
 
 
 @kernel
+def allowed_m(variance: float, c: Record) -> float:
+    """How long a way beside the shadow's may be, of which inertia leaves open ``variance`` [m^2]."""
+    return float(c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance))
+
+
+@kernel
 def kinematics(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> float:
     """How far the source's way differs from the shadow's, in units of what is allowed: the largest of both windows.
 
@@ -72,7 +78,7 @@ def kinematics(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> floa
             if not np.isfinite(apart):
                 continue
             variance = displacement_variance(window * BLOCK_S, u, m) + 0.5 * seen.scatter * seen.scatter
-            excess = abs(apart) / (c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance))
+            excess = abs(apart) / allowed_m(variance, c)
             largest = max(largest, excess)
             if excess > 1.0 and (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S:
                 _ask_inertia(t_ns, window, apart, u, m, c)
@@ -86,7 +92,7 @@ def _ask_inertia(t_ns: int, window: Integer, apart: float, u: Array, m: Record, 
     carried = third_witness(window, BLOCK_S, u, m)
     drift2 = 0.25 * m.shadow_q * span * span * span * span
     variance = displacement_variance(span, u, m) + drift2
-    limit = c.kinematic_m + c.kinematic_sigmas * math.sqrt(variance)
+    limit = allowed_m(variance, c)
     if abs(carried) < limit:
         return
     m.t_neither = t_ns

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-import msgspec
 import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as mavlink
 from scipy.spatial.transform import Rotation
@@ -33,7 +32,6 @@ from tests.fusion.made_flights import FOCAL_PX, Motion, Scene, Table, fly, motio
 FLIP = np.array([1.0, -1.0, -1.0])
 FLAGS_NAVIGATING = mavlink.EKF_ATTITUDE | mavlink.EKF_VELOCITY_HORIZ | mavlink.EKF_POS_HORIZ_REL
 SCENE = Scene(seed=3, duration_s=8.0, still_s=1.5, sensors=("range0", "flow0", "uwb0"), uwb_rate_hz=50.0)
-Maker = Callable[[int], Any]
 
 
 @dataclass(frozen=True)
@@ -341,11 +339,6 @@ def ahead(config: Config) -> Config:
     T[:3, :3] = np.diag(FLIP)
     data["sensor"]["flow0"]["T_BS"] = T.ravel().tolist()
     return Config.from_dict(data)
-
-
-def with_output(vehicle: Vehicle, **changes: Any) -> Vehicle:
-    """Copy of a vehicle with other output rules."""
-    return msgspec.structs.replace(vehicle, output=msgspec.structs.replace(vehicle.output, **changes))
 
 
 def axial_errors(course: Course, odometry: np.ndarray, start_s: float, end_s: float) -> np.ndarray:

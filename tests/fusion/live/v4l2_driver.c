@@ -42,27 +42,21 @@ static int connect_camera(void) {
     return device;
 }
 
-int open(const char *path, int flags, ...) {
-    static int (*real)(const char *, int, ...);
-    if (!real) real = dlsym(RTLD_NEXT, "open");
-    if (is_ours(path)) return connect_camera();
-    va_list more;
-    va_start(more, flags);
-    int mode = va_arg(more, int);
-    va_end(more);
-    return real(path, flags, mode);
-}
+/* Both names are in use, depending on how OpenCV was built. */
+#define OPEN(name)                                          \
+    int name(const char *path, int flags, ...) {            \
+        static int (*real)(const char *, int, ...);         \
+        if (!real) real = dlsym(RTLD_NEXT, #name);          \
+        if (is_ours(path)) return connect_camera();         \
+        va_list more;                                       \
+        va_start(more, flags);                              \
+        int mode = va_arg(more, int);                       \
+        va_end(more);                                       \
+        return real(path, flags, mode);                     \
+    }
 
-int open64(const char *path, int flags, ...) {
-    static int (*real)(const char *, int, ...);
-    if (!real) real = dlsym(RTLD_NEXT, "open64");
-    if (is_ours(path)) return connect_camera();
-    va_list more;
-    va_start(more, flags);
-    int mode = va_arg(more, int);
-    va_end(more);
-    return real(path, flags, mode);
-}
+OPEN(open)
+OPEN(open64)
 
 static size_t bytes(void) { return (size_t)width * height * 2; }
 
