@@ -59,6 +59,11 @@ class Grabber:
             self._source.close()
 
     @property
+    def reconnected(self) -> int:
+        """How often the camera had gone away and came back."""
+        return self._source.reconnected
+
+    @property
     def rate_hz(self) -> float | None:
         """Mean rate of the pictures so far [Hz]."""
         if self.first_ns is None or self.last_ns is None or self.last_ns == self.first_ns:

@@ -88,6 +88,8 @@ class Report:
             f"    gaps {counts['gaps']} ({counts['missing']} pictures missing), repeated stamps {counts['repeated']}, "
             f"stamps going back {counts['backwards']}, unreadable {counts['unread']}"
         )
+        if self._source.reconnected:
+            lines.append(f"NOT always there: gone and opened anew {self._source.reconnected} times")
         where = (
             "from the driver" if self._stamped() else f"{self._source.stamps_by_arrival} by arrival: late and jittery"
         )

@@ -27,6 +27,7 @@ MANUAL = 1.0
 EXPOSURE_TOLERANCE = 0.1  # sensors round to whole lines
 SETTLING_FRAMES = 5  # settings take effect some frames later
 PLAUSIBLE_S = 1.0
+GONE_NS = 1_000_000_000  # without a picture for longer, the device is opened anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +51,11 @@ class Setting:
 
 
 class Source(Protocol):
-    """Where pictures come from."""
+    """Where pictures come from; ``reconnected`` counts how often the device had gone and came back."""
 
     settings: list[Setting]
     stamps_by_arrival: int
+    reconnected: int
 
     def pictures(self) -> Iterator[Picture | None]:
         """Pictures as they come; None where one could not be read."""
@@ -74,10 +76,7 @@ def open_source(
     """
     path = Path(camera.source)
     if camera.source.startswith("/dev/"):
-        capture = cv2.VideoCapture(camera.source, cv2.CAP_V4L2)
-        if not capture.isOpened():
-            raise ConfigError(f"camera.source {camera.source}: no camera there, or another program has it")
-        return V4l2Source(capture, camera, spec, clock)
+        return V4l2Source(lambda: cv2.VideoCapture(camera.source, cv2.CAP_V4L2), camera, spec, clock)
     if path.is_dir():
         return FolderSource(path, camera, spec, clock, sleep)
     if path.is_file():
@@ -86,26 +85,34 @@ def open_source(
 
 
 class V4l2Source:
-    """A camera through OpenCV's V4L2 backend, its exposure locked and read back.
+    """A camera through OpenCV's V4L2 backend, its exposure locked and read back; opened anew after it has gone away.
 
-    ``capture`` is an opened ``cv2.VideoCapture``.
+    ``connect`` gives a new ``cv2.VideoCapture``, opened if there is a camera.
 
     Raises
     ------
     ConfigError
-        The camera does not do what it was told: picture size, or exposure where one is asked for.
+        No camera is there, or it does not do what it was told: picture size, or exposure where one is asked for.
     """
 
-    def __init__(self, capture: Any, camera: CameraInput, spec: Camera, clock: Callable[[], int]) -> None:
+    def __init__(self, connect: Callable[[], Any], camera: CameraInput, spec: Camera, clock: Callable[[], int]) -> None:
         self.settings: list[Setting] = []
         self.stamps_by_arrival = 0
-        self._capture, self._camera, self._clock = capture, camera, clock
+        self.reconnected = 0
+        self._connect, self._camera, self._spec, self._clock = connect, camera, spec, clock
         self._readout_s = spec.readout_s or 0.0
         self._exposure_s: float | None = None
+        self._open()
+
+    def _open(self) -> None:
+        self._capture = self._connect()
+        if not self._capture.isOpened():
+            raise ConfigError(f"camera.source {self._camera.source}: no camera there, or another program has it")
+        self.settings = []
         try:
-            self._configure(spec)
+            self._configure(self._spec)
         except ConfigError:
-            capture.release()
+            self._capture.release()
             raise
 
     def _configure(self, spec: Camera) -> None:
@@ -142,22 +149,38 @@ class V4l2Source:
 
     def pictures(self) -> Iterator[Picture | None]:
         """Pictures for ever, after the first few, which are taken before the settings have settled."""
-        number = 0
+        number, seen_ns = 0, self._clock()
         while True:
-            try:
-                if not self._capture.grab():
-                    yield None
-                    continue
-                arrival = self._clock()
-                stamp_ns = self._stamp(arrival)
-                good, image = self._capture.retrieve()
-            except cv2.error:  # OpenCV checks what the driver says, and some drivers say strange things
-                yield None
+            picture = self._read()
+            if picture is not None:
+                number, seen_ns = number + 1, picture.arrival_ns
+                if number > SETTLING_FRAMES:
+                    yield picture
                 continue
-            number += 1
-            if number <= SETTLING_FRAMES:
-                continue
-            yield Picture(self._middle(stamp_ns), arrival, np.asarray(image), self._exposure_s) if good else None
+            if self._clock() - seen_ns > GONE_NS:
+                number = 0 if self._reopen() else number
+                seen_ns = self._clock()
+            yield None
+
+    def _read(self) -> Picture | None:
+        try:
+            if not self._capture.grab():
+                return None
+            arrival = self._clock()
+            stamp_ns = self._stamp(arrival)
+            good, image = self._capture.retrieve()
+        except cv2.error:  # OpenCV checks what the driver says, and some drivers say strange things
+            return None
+        return Picture(self._middle(stamp_ns), arrival, np.asarray(image), self._exposure_s) if good else None
+
+    def _reopen(self) -> bool:
+        self._capture.release()
+        try:
+            self._open()
+        except ConfigError:
+            return False  # not there yet, or not ready to take its settings
+        self.reconnected += 1
+        return True
 
     def _stamp(self, arrival_ns: int) -> int:
         stamp_ns = round(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) * 1e6)
@@ -184,7 +207,7 @@ class _Recorded:
         exposure = camera.exposure_s or spec.exposure_s
         told = f"{exposure:g}" if exposure else "not known"
         self.settings = [Setting("exposure [s]", "as recorded", told, good=exposure is not None)]
-        self.stamps_by_arrival = 0
+        self.stamps_by_arrival = self.reconnected = 0
         self._exposure_s, self._clock, self._sleep = exposure, clock, sleep
 
     def _recorded(self) -> Iterator[tuple[int, Image | None]]:

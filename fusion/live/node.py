@@ -229,7 +229,8 @@ class Node:
             return None
         counts = dict.fromkeys((*Grabber.COUNTED, *MotionStage.COUNTED), 0) | self._grabber.counts
         counts |= {**self._motion.counts, "overwritten": self._grabber.mailbox.dropped}
-        return {**counts, "rate_hz": self._grabber.rate_hz, "ended": self._grabber.ended}
+        grabber = self._grabber
+        return {**counts, "rate_hz": grabber.rate_hz, "reconnected": grabber.reconnected, "ended": grabber.ended}
 
     def _processor_s(self) -> dict[str, float]:
         """Processor time of each thread so far [s]."""

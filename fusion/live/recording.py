@@ -12,6 +12,7 @@ import msgspec
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.fusion.live.dialect import Message
+from axialnav.fusion.live.recorder.limits import Limits
 from axialnav.fusion.live.recorder.recorder import Recorder
 from axialnav.fusion.outcome import AxialState, Outcome, Verdict
 from axialnav.fusion.readings import CameraFrame, ImuSample, Reading
@@ -30,6 +31,8 @@ class FlightRecording:
         Whether pictures are recorded.
     clock
         The one monotonic clock [ns].
+    limits
+        Of memory and disk; those of :class:`~axialnav.fusion.live.recorder.recorder.Recorder` if None.
 
     Attributes
     ----------
@@ -42,10 +45,11 @@ class FlightRecording:
         The folder cannot be made.
     """
 
-    def __init__(self, folder: Path, frames: bool, clock: Callable[[], int]) -> None:
+    def __init__(self, folder: Path, frames: bool, clock: Callable[[], int], limits: Limits | None = None) -> None:
         self.problem = ""
-        self._folder, self._frames, self._clock = folder, frames, clock
+        self._folder, self._frames, self._clock, self._limits = folder, frames, clock, limits
         self._recorder: Recorder | None = None
+        self._ended: Recorder | None = None
         self._closing: list[threading.Thread] = []
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -56,7 +60,8 @@ class FlightRecording:
         """End the file, behind the filter's back, and begin the next with the configuration of the new filter."""
         self._end()
         try:
-            self._recorder = Recorder(self._next_path(), config=config, about={"source": "axialnav live"})
+            about = {"source": "axialnav live"}
+            self._recorder = Recorder(self._next_path(), config=config, about=about, limits=self._limits)
             self.problem = ""
         except FlightError as error:
             self.problem = str(error)  # flying goes on without a recording
@@ -85,10 +90,11 @@ class FlightRecording:
         self._write("state", state.t_ns, state)
 
     def status(self) -> dict[str, Any]:
-        """Counters of the file that is being written."""
+        """Counters of the file that is being written, or of the last one."""
         counters: dict[str, Any] = {}
-        if self._recorder is not None:
-            counters = {"file": str(self._recorder.path), **msgspec.to_builtins(self._recorder.status())}
+        recorder = self._recorder or self._ended
+        if recorder is not None:
+            counters = {"file": str(recorder.path), **msgspec.to_builtins(recorder.status())}
         if self.problem:
             counters["problem"] = self.problem
         return counters
@@ -108,7 +114,7 @@ class FlightRecording:
         if self._recorder is None:
             return
         thread = threading.Thread(target=self._recorder.close, name="recorder-close")
-        self._recorder = None
+        self._recorder, self._ended = None, self._recorder
         self._closing = [t for t in self._closing if t.is_alive()] + [thread]
         thread.start()
 

@@ -10,8 +10,11 @@ from typing import Any
 
 from mcap.reader import make_reader
 
+from axialnav.fusion.corridor import CorridorEstimator
 from axialnav.fusion.live.node import Node
+from axialnav.fusion.readings import ImuSample
 from axialnav.replay.flight import load_flight
+from axialnav.replay.flight_readings import merge_readings
 from axialnav.replay.run import replay
 from tests.fusion.live.streamed import StreamedVehicle, serial_sensors
 
@@ -76,10 +79,23 @@ def recorded_is_what_was_pushed(path: Path, status: dict[str, Any]) -> None:
 
 
 def the_recording_replays_to_the_last_bit(path: Path, node: Node) -> None:
-    """Late, damaged and lost as it was, what was flown is what the replay of its recording gives."""
+    """Late, damaged and lost as it was, what was flown is what its recording gives, pushed and in one run."""
     snapshot = node.core.snapshot(0)
     assert snapshot is not None
-    track = replay(load_flight(path)).track
-    assert track.t_ns[-1] == snapshot.state.t_ns
-    assert track.velocity_m_s[-1].tobytes() == snapshot.state.velocity_m_s.tobytes()
-    assert track.position_m[-1].tobytes() == snapshot.state.position_m.tobytes()
+    flight = load_flight(path)
+    estimator = CorridorEstimator(flight.config)
+    last = None
+    for reading in merge_readings(flight):
+        estimator.push(reading)
+        if reading.t_ns == snapshot.imu_ns and isinstance(reading, ImuSample):
+            last = estimator.state()
+    flown, pushed = snapshot.state, estimator.state()
+    assert pushed.t_ns == flown.t_ns
+    assert pushed.velocity_m_s.tobytes() == flown.velocity_m_s.tobytes()
+    assert pushed.position_m.tobytes() == flown.position_m.tobytes()
+    assert pushed.covariance.tobytes() == flown.covariance.tobytes()
+    track = replay(flight).track  # has the state at the last inertial sample, before what came after it
+    assert last is not None
+    assert track.t_ns[-1] == last.t_ns
+    assert track.velocity_m_s[-1].tobytes() == last.velocity_m_s.tobytes()
+    assert track.position_m[-1].tobytes() == last.position_m.tobytes()

@@ -12,7 +12,7 @@ import numpy as np
 
 from tests.fusion.live.streamed import Air, Course, StreamedVehicle
 
-PATIENCE_S = 60.0
+PATIENCE_S = 300.0
 
 
 @dataclass(frozen=True)

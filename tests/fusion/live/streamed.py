@@ -139,7 +139,7 @@ class StreamedVehicle:
 
     def start(self) -> None:
         """Begin as soon as the node is heard: the flight's first instant is then."""
-        self.socket.settimeout(30.0)
+        self.socket.settimeout(300.0)  # the node may have to compile first
         _, self.peer = self.socket.recvfrom(4096)
         self.socket.settimeout(0.02)
         self.t0_ns = time.monotonic_ns()

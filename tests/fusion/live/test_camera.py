@@ -162,6 +162,9 @@ class Driver:
         self.started_ns = 0
         self.released = False
 
+    def isOpened(self) -> bool:
+        return True
+
     def set(self, key: int, value: float) -> bool:
         if key == self.refuses:
             return False
@@ -191,7 +194,7 @@ def test_exposure_is_locked_read_back_and_the_stamp_is_the_middle_of_it() -> Non
     clock = Clock()
     driver = Driver(clock)
     camera = CameraInput(source="/dev/video0", exposure_s=0.01, fourcc="YUYV", gain=3.0)
-    source = V4l2Source(driver, camera, SPEC, clock)
+    source = V4l2Source(lambda: driver, camera, SPEC, clock)
     assert driver.values[cv2.CAP_PROP_AUTO_EXPOSURE] == 1.0
     assert all(setting.good for setting in source.settings)
     pictures = source.pictures()
@@ -202,7 +205,9 @@ def test_exposure_is_locked_read_back_and_the_stamp_is_the_middle_of_it() -> Non
     assert first.t_ns == pytest.approx(50 * S + SETTLING_FRAMES * PERIOD_NS + 5 * MS, abs=0.02 * MS)
     assert second.t_ns - first.t_ns == PERIOD_NS
     assert first.arrival_ns - first.t_ns == pytest.approx(PERIOD_NS - 5 * MS, abs=0.02 * MS)
-    late = V4l2Source(Driver(clock), CameraInput(source="/dev/video0", exposure_s=0.01, stamp="end"), SPEC, clock)
+    second_driver = Driver(clock)
+    ending = CameraInput(source="/dev/video0", exposure_s=0.01, stamp="end")
+    late = V4l2Source(lambda: second_driver, ending, SPEC, clock)
     began = clock.now_ns + SETTLING_FRAMES * PERIOD_NS
     picture = next(late.pictures())
     assert picture is not None
@@ -221,13 +226,14 @@ def test_a_driver_that_does_not_do_as_told_is_refused(key: int, words: str) -> N
     clock = Clock()
     driver = Driver(clock, refuses=key)
     with pytest.raises(ConfigError, match=words):
-        V4l2Source(driver, CameraInput(source="/dev/video0", exposure_s=0.01), SPEC, clock)
+        V4l2Source(lambda: driver, CameraInput(source="/dev/video0", exposure_s=0.01), SPEC, clock)
     assert driver.released
 
 
 def test_a_driver_without_stamps_is_counted() -> None:
     clock = Clock()
-    source = V4l2Source(Driver(clock, stamps=False), CameraInput(source="/dev/video0"), SPEC, clock)
+    driver = Driver(clock, stamps=False)
+    source = V4l2Source(lambda: driver, CameraInput(source="/dev/video0"), SPEC, clock)
     pictures = source.pictures()
     for _ in range(3):
         assert next(pictures) is not None

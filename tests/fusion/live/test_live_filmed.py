@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import os
+import stat
 import time
 from itertools import islice
 from pathlib import Path
@@ -15,6 +17,7 @@ from numba.core.registry import CPUDispatcher
 from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
 from axialnav.fusion.live.node import Node
+from axialnav.fusion.live.recorder.limits import Limits
 from axialnav.fusion.live.recording import FlightRecording
 from axialnav.fusion.live.vehicle import CameraInput, Vehicle
 from axialnav.fusion.live.warm_up import wall_pictures, warm_up
@@ -37,6 +40,7 @@ SECONDS, STILL_S = 10.0, 2.0
 BAD = Air(jitter_s=0.002, lost=0.05, reordered=0.05, damaged=0.10, seed=5)
 SILENCE_S = 0.25
 WINDOW_S = 0.07  # motion belongs to the middle of five pictures and is fused after the last of them
+SLOW_DISK = 400_000.0  # bytes a second
 SCATTER = 1.6  # of one run of eight seconds on a busy machine; the bench pools several
 
 pytestmark = pytest.mark.slow
@@ -116,6 +120,45 @@ def test_the_camera_freezes_for_a_while(folder: Path) -> None:
     silent = [t for t, quiet in said if quiet and t > 3.0]
     assert silent[0] < 4.0 + SILENCE_S + WINDOW_S + 0.1
     assert np.abs(streamed.axial_errors(3.0, 8.9)).max() < 0.5
+
+
+def test_a_disk_that_cannot_keep_up_costs_pictures_and_nothing_else(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pictures need three times what the disk takes; the flight does not notice, and every number is recorded."""
+    write = os.write
+
+    def slowly(file: int, data: bytes) -> int:
+        if stat.S_ISREG(os.fstat(file).st_mode):
+            time.sleep(len(data) / SLOW_DISK)
+        return write(file, data)
+
+    monkeypatch.setattr(os, "write", slowly)
+    course = filmed_course(folder)
+    streamed, shutter = StreamedVehicle(course), Shutter(folder, course.config)
+    vehicle = with_camera(vehicle_of(course.config, streamed.port, streamed.ttys))
+    warm_up(vehicle.filter, vehicle.estimator)
+    recording = FlightRecording(tmp_path, True, time.monotonic_ns, Limits(picture_queue=1 << 20))
+    node = Node(vehicle, source=shutter, recording=recording)
+    node.start()
+    streamed.start()
+    shutter.release(streamed.t0_ns)
+    try:
+        assert wait_for(lambda: streamed.now_s() > 8.0, 60.0)
+    finally:
+        node.close()
+        streamed.close()
+    status = node.status()
+    recorded = status["recording"]
+    assert node.failure == ""
+    assert set(recorded["dropped"]) == {"cam0/picture"}
+    assert set(recorded["reasons"]) == {"disk too slow"}
+    assert recorded["dropped"]["cam0/picture"] > 60
+    seen = sum(status["camera"][what] for what in ("measured", "refused", "unusable"))
+    assert recorded["written"]["cam0/picture"] + recorded["dropped"]["cam0/picture"] == seen > 120
+    assert np.abs(streamed.axial_errors(STILL_S, 7.8)).max() < 0.2
+    (path,) = tmp_path.glob("*.mcap")
+    the_recording_replays_to_the_last_bit(path, node)
 
 
 def test_after_the_warm_up_no_picture_waits_for_a_compiler(folder: Path) -> None:

@@ -47,11 +47,13 @@ def driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return library
 
 
-def camera(driver: Path, folder: Path, width: int = 640, **behaviour: str) -> subprocess.CompletedProcess[str]:
-    """``axialnav camera`` for two seconds on the driver."""
+def camera(
+    driver: Path, folder: Path, width: int = 640, seconds: int = 2, **behaviour: str
+) -> subprocess.CompletedProcess[str]:
+    """``axialnav camera`` for some seconds on the driver."""
     (folder / "vehicle.toml").write_text(VEHICLE.replace("[640,", f"[{width},"))
     loaded = {"LD_PRELOAD": str(driver), "DRIVER_DEVICE": DEVICE, "OPENCV_LOG_LEVEL": "OFF", **behaviour}
-    command = [sys.executable, "-m", "axialnav", "camera", "--config", "vehicle.toml", "--seconds", "2"]
+    command = [sys.executable, "-m", "axialnav", "camera", "--config", "vehicle.toml", "--seconds", f"{seconds}"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), **loaded}
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=100
@@ -92,3 +94,14 @@ def test_a_camera_that_goes_away_is_counted_and_not_waited_for(driver: Path, tmp
     unreadable = re.search(r"unreadable (\d+)", told.stdout)
     assert unreadable is not None
     assert int(unreadable[1]) > 5
+
+
+def test_a_camera_that_comes_back_is_opened_anew_with_its_settings(driver: Path, tmp_path: Path) -> None:
+    """It goes after 25 pictures, can be opened again after a second, and is still set to what was asked for."""
+    told = camera(driver, tmp_path, seconds=5, DRIVER_BREAKS="25", DRIVER_RETURNS="1000")
+    assert "NOT always there: gone and opened anew 1 times" in told.stdout
+    assert re.search(r"ok  set exposure \[0.1 ms\] +100  is 100\n", told.stdout)
+    pictures = re.search(r"(\d+) pictures\n", told.stdout)
+    assert pictures is not None
+    assert int(pictures[1]) > 45
+    assert "gaps 1 " in told.stdout

@@ -2,7 +2,8 @@
  *
  * DRIVER_DEVICE   the file that is the camera, for example /dev/video77
  * DRIVER_REFUSES  exposure | manual | size: what is not taken
- * DRIVER_BREAKS   number of the frame after which the device is gone
+ * DRIVER_BREAKS   number of the frame after which the device is gone, once
+ * DRIVER_RETURNS  milliseconds after which it can be opened again; never if not given
  *
  * Frames are YUYV, 30 a second, of a wall that moves 3 px a frame to the left.  Stamps are monotonic, of the start of the
  * exposure, which is 20 ms before a buffer can be taken. 
@@ -23,8 +24,9 @@
 
 enum { BUFFERS = 8, STEP_PX = 3, AGE_US = 20000 };
 
-static int device = -1, width = 640, height = 480, queued[BUFFERS], waiting;
+static int device = -1, width = 640, height = 480, queued[BUFFERS], waiting, gone;
 static long exposure = 157, automatic = 3, gain = 1, frame;
+static int64_t gone_ms;
 static unsigned char *buffers[BUFFERS];
 
 static int refuses(const char *what) {
@@ -37,8 +39,17 @@ static int is_ours(const char *path) {
     return named && path && !strcmp(path, named);
 }
 
+static int64_t now_ms(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
 static int connect_camera(void) {
+    const char *returns = getenv("DRIVER_RETURNS");
+    if (gone_ms && (!returns || now_ms() - gone_ms < atol(returns))) return errno = ENOENT, -1;
     device = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK);
+    gone = 0, exposure = 157, automatic = 3, gain = 1;
     return device;
 }
 
@@ -116,7 +127,8 @@ static int control(unsigned long request, struct v4l2_control *c) {
 static int take_buffer(struct v4l2_buffer *b) {
     uint64_t due;
     const char *breaks = getenv("DRIVER_BREAKS");
-    if (breaks && frame >= atol(breaks)) return errno = ENODEV, -1;
+    if (breaks && !gone_ms && frame >= atol(breaks)) gone_ms = now_ms(), gone = 1;
+    if (gone) return errno = ENODEV, -1;
     if (read(device, &due, sizeof due) != sizeof due || !waiting) return errno = EAGAIN, -1;
     frame += due;
     int index = queued[0];
