@@ -26,6 +26,9 @@ Plane = NDArray[np.float32]
 PHASE_STEP = 0.25  # cycles between neighbouring displacements at the highest useful frequency and lag
 LOBES = 1.5  # useful lobes of the exposure's sinc
 FLOOR = 0.05
+LEAST_MANTISSA = np.int32(0x3F3504F3)  # the bits of sqrt(1/2)
+SERIES = (np.float32(2.0), np.float32(2.0 / 3.0), np.float32(2.0 / 5.0), np.float32(2.0 / 7.0))  # of 2 artanh z
+LOG_2 = np.float32(math.log(2.0))
 CLIMB_STEPS = 5
 
 
@@ -70,17 +73,31 @@ def comb_table(
 
 @kernel
 def rank(table: Plane, share: Plane, relative: Plane, weight: Plane, out: Array) -> None:
-    """Gain in log-likelihood per row of every comb (d, g) over no motion, ``out`` (d,)."""
+    """Gain in log-likelihood per row of every comb (d, g) over no motion, ``out`` (d,).
+
+    The logarithm is that of the mantissa by its series plus the exponent, which a processor does for many numbers at
+    once; good to 1e-7.
+    """
     groups = share.shape[0]
     still = np.float32(0.0)
     for g in range(groups):
         still += weight[g] * relative[g]
-    part = np.empty(groups, dtype=np.float32)
+    model, power, part = np.empty((3, groups), dtype=np.float32)
+    bits = model.view(np.int32)
     for i in range(table.shape[0]):
         line = table[i]
         for g in range(groups):
-            model = np.float32(1.0 + FLOOR) + share[g] * (line[g] - np.float32(1.0))
-            part[g] = weight[g] * (np.log(model) + relative[g] / model)
+            model[g] = np.float32(1.0 + FLOOR) + share[g] * (line[g] - np.float32(1.0))
+            part[g] = relative[g] / model[g]
+        for g in range(groups):
+            above = bits[g] - LEAST_MANTISSA
+            power[g] = np.float32(above >> np.int32(23))
+            bits[g] = (above & np.int32(0x007FFFFF)) + LEAST_MANTISSA
+        for g in range(groups):
+            z = (model[g] - np.float32(1.0)) / (model[g] + np.float32(1.0))
+            s = z * z
+            logarithm = z * (SERIES[0] + s * (SERIES[1] + s * (SERIES[2] + s * SERIES[3]))) + power[g] * LOG_2
+            part[g] = weight[g] * (part[g] + logarithm)
         out[i] = still - part.sum()
 
 

@@ -47,9 +47,16 @@ def pair_lags(times: Sequence[int]) -> Array:
 @kernel
 def exposure_power(frequency: Array, blur_px: float, out: Array) -> None:
     """``sinc(f l)^2`` and its derivative to l at every frequency, columns 0 and 1 of ``out``."""
+    step = frequency[1] - frequency[0] if frequency.shape[0] > 1 else 0.0
+    step_re, step_im = math.cos(math.pi * step * blur_px), math.sin(math.pi * step * blur_px)
+    cosine, sine, before = 1.0, 0.0, -math.inf
     for j in range(frequency.shape[0]):
         x = max(math.pi * frequency[j] * blur_px, SMALL_ANGLE)
-        sine, cosine = math.sin(x), math.cos(x)
+        if x > SMALL_ANGLE and abs(frequency[j] - before - step) < SAME_STEP * step:  # a turn costs a tenth of a cosine
+            cosine, sine = cosine * step_re - sine * step_im, cosine * step_im + sine * step_re
+        else:
+            cosine, sine = math.cos(x), math.sin(x)
+        before = frequency[j] if x > SMALL_ANGLE else -math.inf
         sinc = sine / x
         out[j, 0] = sinc * sinc
         out[j, 1] = 2.0 * math.pi * frequency[j] * sinc * (cosine - sinc) / x

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 FLIP = np.diag([1.0, -1.0, -1.0])  # FLU <-> FRD, its own inverse
+UPPER = np.triu_indices(6)
 
 
 def flipped(x: float, y: float, z: float) -> Vector3:
@@ -63,4 +64,4 @@ def cross_matrix(v: Array) -> Array:
 
 def upper_triangle(covariance: Array) -> list[float]:
     """The 21 numbers in which MAVLink sends a symmetric 6x6 matrix."""
-    return [float(v) for v in covariance[np.triu_indices(6)]]
+    return [float(v) for v in covariance[UPPER]]
