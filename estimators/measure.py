@@ -119,10 +119,11 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     kappa = blur_ratio(fit, products.band, products.rows.sum(axis=0), options.exposure_ratio)
     if options.kappa and frames == 2 and kappa.alarming:
         return refused(MotionReason.KAPPA, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
+    cross_px, cross_sigma_px = cross_or_nan(drift)
     return MotionEstimate(
         float(fit.motion[0]),
         math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames)),
-        cross_or_nan(drift),
+        cross_px,
         True,
         MotionReason.GOOD,
         True,
@@ -130,6 +131,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         kappa.value,
         acceleration_px=float(fit.motion[1]) if len(fit.motion) == 2 else 0.0,
         bands=votes,
+        cross_sigma_px=cross_sigma_px,
     )
 
 

@@ -63,6 +63,8 @@ class MotionEstimate:
         Middle of the window [ns]; None where the frames came without stamps.
     note
         What happened to the window (a gap that emptied the ring), or "".
+    cross_sigma_px
+        Standard deviation of ``cross_px`` [px]; NaN where that is.
     """
 
     displacement_px: float
@@ -78,6 +80,7 @@ class MotionEstimate:
     bands: tuple[int, int] = (0, 0)
     t_ns: int | None = None
     note: str = ""
+    cross_sigma_px: float = math.nan
 
     def __post_init__(self) -> None:
         if self.accepted and not (math.isfinite(self.displacement_px) and 0.0 < self.sigma_px < math.inf):

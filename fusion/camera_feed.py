@@ -50,17 +50,21 @@ class CameraFeed:
         if estimate is None or not estimate.accepted or estimate.t_ns is None:
             return None
         period_s = estimate.window_s / self._periods
+        seen = math.isfinite(estimate.cross_px)
+        rotation_px = [rotation_sigma_px(self._config, frame.sensor, period_s, axis) for axis in range(2)]
         return PixelMotion(
             t_ns=estimate.t_ns,
             sensor=frame.sensor,
             window_s=period_s,
             dx_px=estimate.displacement_px,
-            sigma_px=math.hypot(estimate.sigma_px, rotation_sigma_px(self._config, frame.sensor, period_s)),
+            dy_px=estimate.cross_px if seen else None,
+            sigma_px=math.hypot(estimate.sigma_px, rotation_px[0]),
+            sigma_dy_px=math.hypot(estimate.cross_sigma_px, rotation_px[1]) if seen else None,
         )
 
 
-def rotation_sigma_px(config: Config, camera: str, period_s: float) -> float:
-    """What the gyro's noise makes of the image's rotation over a frame period [px].
+def rotation_sigma_px(config: Config, camera: str, period_s: float, axis: int = 0) -> float:
+    """What the gyro's noise makes of the image's rotation over a frame period, along one of its axes [px].
 
     The filter takes the rotation out with the mean rate over the period, so that the noise of that mean is noise of the
     reading: ``f T`` times density over the root of the period, or of the sampling period where that is longer.
@@ -71,7 +75,7 @@ def rotation_sigma_px(config: Config, camera: str, period_s: float) -> float:
         return 0.0
     rate_hz = min(imu.rate_hz or USUAL_IMU_HZ, 1.0 / period_s)
     mean = imu.gyro_noise_density * config.imu.gyro_noise_scale * math.sqrt(rate_hz)
-    return spec.focal_px[0] * period_s * mean
+    return spec.focal_px[axis] * period_s * mean
 
 
 def _motion_estimator(camera: Camera, config: Config) -> MotionEstimator:

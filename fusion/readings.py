@@ -68,7 +68,7 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
     """Signed displacement of the image content over a window, stamped at the window's middle.
 
     ``dy_px`` is None for one-axis estimates; ``sigma_px`` None means the sensor's configured value; ``quality`` is the
-    chip's own figure, 0 meaning unusable.
+    chip's own figure, 0 meaning unusable; ``sigma_dy_px`` None means that ``sigma_px`` is that of both axes.
     """
 
     window_s: float
@@ -76,6 +76,7 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
     dy_px: float | None = None
     sigma_px: float | None = None
     quality: float | None = None
+    sigma_dy_px: float | None = None
 
     def __post_init__(self) -> None:
         self._stamp()
@@ -84,6 +85,7 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
         if self.dy_px is not None:
             self._finite("dy_px", self.dy_px, -1e5, 1e5)
         _sigma(self, "sigma_px", self.sigma_px)
+        _sigma(self, "sigma_dy_px", self.sigma_dy_px)
 
 
 class CameraFrame(Reading, frozen=True, kw_only=True, eq=False):

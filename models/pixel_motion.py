@@ -10,9 +10,11 @@ A wall point on the optical axis at distance Z moves in the image with
 image has the slope a = x / f, it moves with
 
 .. math::
-    \dot u = -f_x \left( \frac{v_{S,x} - a v_{S,z}}{Z(a)} + (1 + a^2) \omega_{S,y} \right)
+    \dot u = -f_x \left( \frac{v_{S,x} - a v_{S,z}}{Z(a)} + (1 + a^2) \omega_{S,y} \right),
+    \qquad
+    \dot v = -f_y \left( \frac{v_{S,y}}{Z(a)} - \omega_{S,x} + a \, \omega_{S,z} \right)
 
-and likewise for y.  Over a window T the content moves by ``(1 + k) T`` times that, with the blur scale k as a state.
+Over a window T the content moves by ``(1 + k) T`` times that, with the blur scale k as a state.
 The reading stays in pixels: dividing by a noisy distance first would correlate it with the range finder and make its
 noise depend on speed.
 
@@ -64,28 +66,26 @@ def pixel_motion(
 ) -> float:
     """Predict the displacement [px] along image axis 0 (x) or 1 (y) and write its Jacobian row into ``H`` (25,).
 
-    The place in the image is on that axis, where the ray has this ``slope`` against the optical axis.
+    The place in the image is on the x axis, where the ray has this ``slope`` against the optical axis.
     ``focal_window`` (2,) is focal length times window [px s] per image axis; ``work`` (11,) is scratch.  Returns NaN
     where the ray does not meet the surface (blind, not wrong).
     """
     ray_B = work[8:11]
-    ray_B[0], ray_B[1], ray_B[2] = _mixed(R_BS, 2, axis, slope)
+    ray_B[0], ray_B[1], ray_B[2] = _mixed(R_BS, 2, 0, slope)
     limit = MIN_COSINE if slope == 0.0 else GRAZING
     if not distance_along_ray(p_W, R_WB, lever_B, ray_B, normal_W, offset_m, work) > limit:
         return np.nan
     distance = work[0]
     if distance < MIN_DISTANCE_M:
         return np.nan
-    # image x sees rotation about sensor y, image y the opposite rotation about sensor x
-    a0, a1, a2 = _mixed(R_BS, axis, 2, -slope)
-    about = R_BS[:, 1 - axis]
-    turn = (1.0 - 2.0 * axis) * (1.0 + slope * slope)
+    a0, a1, a2 = _mixed(R_BS, axis, 2, -slope * (1.0 - axis))
+    b0, b1, b2 = _turned_about(R_BS, axis, slope)
     v0, v1, v2 = _in_body(R_WB, x[VEL], x[VEL + 1], x[VEL + 2])
     w0, w1, w2 = gyro_rad_s[0] - x[GYRO_BIAS], gyro_rad_s[1] - x[GYRO_BIAS + 1], gyro_rad_s[2] - x[GYRO_BIAS + 2]
     # (lever x a) appears both in the speed of the camera and in its derivative by the gyro bias
     l0, l1, l2 = _cross(lever_B[0], lever_B[1], lever_B[2], a0, a1, a2)
     speed = a0 * v0 + a1 * v1 + a2 * v2 + w0 * l0 + w1 * l1 + w2 * l2
-    rate = about[0] * w0 + about[1] * w1 + about[2] * w2
+    rate = b0 * w0 + b1 * w1 + b2 * w2
     gain = focal_window[axis] * (1.0 + x[BLUR_SCALE])
     per_speed = -gain / distance
     per_distance = gain * speed / (distance * distance)
@@ -97,10 +97,10 @@ def pixel_motion(
     H[E_ATT] += per_speed * t0
     H[E_ATT + 1] += per_speed * t1
     H[E_ATT + 2] += per_speed * t2
-    H[E_GYRO_BIAS] = -per_speed * l0 + gain * turn * about[0]
-    H[E_GYRO_BIAS + 1] = -per_speed * l1 + gain * turn * about[1]
-    H[E_GYRO_BIAS + 2] = -per_speed * l2 + gain * turn * about[2]
-    flow = -gain * (speed / distance + turn * rate)
+    H[E_GYRO_BIAS] = -per_speed * l0 + gain * b0
+    H[E_GYRO_BIAS + 1] = -per_speed * l1 + gain * b1
+    H[E_GYRO_BIAS + 2] = -per_speed * l2 + gain * b2
+    flow = -gain * (speed / distance + rate)
     H[E_BLUR_SCALE] = flow / (1.0 + x[BLUR_SCALE])
     if offset_is_state:
         H[E_WALL_OFFSET] = per_distance * work[7]
@@ -114,6 +114,20 @@ def _mixed(R_BS: Array, first: Integer, second: Integer, share: float) -> tuple[
         R_BS[0, first] + share * R_BS[0, second],
         R_BS[1, first] + share * R_BS[1, second],
         R_BS[2, first] + share * R_BS[2, second],
+    )
+
+
+@kernel
+def _turned_about(R_BS: Array, axis: Integer, slope: float) -> tuple[float, float, float]:
+    """Rotation vector that an image axis sees, body coordinates.
+
+    Image x sees rotation about sensor y; image y the opposite one about sensor x and, beside the axis, that about z.
+    """
+    x, y, z = -float(axis), (1.0 - axis) * (1.0 + slope * slope), axis * slope
+    return (
+        x * R_BS[0, 0] + y * R_BS[0, 1] + z * R_BS[0, 2],
+        x * R_BS[1, 0] + y * R_BS[1, 1] + z * R_BS[1, 2],
+        x * R_BS[2, 0] + y * R_BS[2, 1] + z * R_BS[2, 2],
     )
 
 

@@ -49,17 +49,17 @@ def motion_table(flight: Flight, camera: str, config: Config) -> SensorTable:
         raise FlightError(f"flight {flight.name}, {camera}: {error}") from None
     estimates = [e for e in run.estimates if e.t_ns is not None]
     window = np.array([e.window_s / (frames - 1) for e in estimates])
+    along, across = (
+        np.array([rotation_sigma_px(config, camera, period, axis) for period in window.tolist()]) for axis in range(2)
+    )
     return SensorTable(
         t_ns=np.array([e.t_ns for e in estimates], dtype=np.int64),
         columns={
             "window_s": window,
             "dx_px": np.array([e.displacement_px if e.accepted else np.nan for e in estimates]),
-            "sigma_px": np.array(
-                [
-                    np.hypot(e.sigma_px, rotation_sigma_px(config, camera, period))
-                    for e, period in zip(estimates, window.tolist(), strict=True)
-                ]
-            ),
+            "dy_px": np.array([e.cross_px for e in estimates]),
+            "sigma_px": np.hypot([e.sigma_px for e in estimates], along),
+            "sigma_dy_px": np.hypot([e.cross_sigma_px for e in estimates], across),
         },
     )
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.fusion.kernels.covariance import project
 from axialnav.fusion.kernels.paths import place_of
 from axialnav.fusion.kernels.picture import look_at_surface, motion_at_slope, motion_of_picture
 from axialnav.fusion.kernels.window import state_in_window
@@ -55,7 +56,7 @@ def measure(
     if kind == UWB_RANGE:
         return _measure_uwb_range(t_ns, s, seen, values, x, m, w, c)
     if kind == FLOW:
-        return _measure_flow(t_ns, s, values, x, m, w)
+        return _measure_flow(t_ns, s, values, x, P, m, w)
     if kind == BLUR:
         return _measure_blur(t_ns, s, values, x, P, m, w)
     if kind == RANGE:
@@ -93,7 +94,7 @@ def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
     w.z[0] = values[0]
     if not s.low <= values[0] <= s.high:
         return -OUT_OF_RANGE
-    if not look_at_surface(s, x, np.int64(0), 0.0, w):
+    if not look_at_surface(s, x, 0.0, w):
         return -NO_GEOMETRY
     w.h[0] = wall_range(w.p, w.R, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state, w.H[0], w.ray)
     w.variance[0] = variance_of(values[1], s.sigma) + w.plane[1] ** 2
@@ -168,7 +169,7 @@ def _measure_fix(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m:
 
 
 @kernel
-def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, m: Record, w: Record) -> int:
+def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, P: Array, m: Record, w: Record) -> int:
     if values[4] < s.low:
         return -WEAK_SIGNAL
     if not np.isfinite(values[1]):
@@ -177,9 +178,24 @@ def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, m: Record, w: R
     state_in_window(t_ns, values[0], x, m, w)
     for i in range(axes):
         w.z[i] = values[1 + i]
-        w.variance[i] = values[3] ** 2 if np.isfinite(values[3]) else s.sigma**2
+        sigma = values[5] if i == 1 and np.isfinite(values[5]) else values[3]
+        w.variance[i] = sigma**2 if np.isfinite(sigma) else s.sigma**2
         w.h[i] = motion_of_picture(s, values[0], i, w)
-    return axes if np.isfinite(w.h[0]) else -NO_GEOMETRY
+    if not np.isfinite(w.h[0]):
+        return -NO_GEOMETRY
+    if axes == 2 and s.half_view > 0.0 and not _believable(s, P, w):
+        return 1
+    return axes
+
+
+@kernel
+def _believable(s: Record, P: Array, w: Record) -> bool:
+    """Whether what a picture does across its rows may be true: it is measured by other means than what it does along.
+
+    The two have nothing in common that could go wrong, so that the one must not take the other with it.
+    """
+    apart = w.z[1] - w.h[1]
+    return bool(apart * apart <= s.gate[0] * (project(P, w.H[1], w.PHt) + w.variance[1]))
 
 
 @kernel

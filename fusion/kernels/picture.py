@@ -9,6 +9,7 @@ lets go of those that leave them by more than the texture's coherence.  The pred
     u = \frac{\sum_k g_k u_k}{\sum_k g_k}, \qquad g_k = \exp \left( -\frac{(u_k - u)^2}{2 s^2} \right)
 
 solved from the middle column outwards.  How far the columns in use are apart is how little such a mean can be trusted.
+What the picture does across is seen in the columns that the rows follow: the mean with the same weights.
 
 Source: location by weighted means as in Huber and Ronchetti, Robust Statistics (2009), section 4.8, with Welsch's
 weight; coherence s and the share of the spread were measured on rendered turns (docs/filter/pixel-motion.md).
@@ -34,13 +35,13 @@ SPREAD_SHARE = 0.5
 
 
 @kernel
-def look_at_surface(s: Record, x: Array, axis: Integer, slope: float, w: Record) -> bool:
+def look_at_surface(s: Record, x: Array, slope: float, w: Record) -> bool:
     """Write the plane in view: its normal into ``w.normal``, offset and roughness [m] into ``w.plane``.
 
-    It is looked for along the ray with this slope along an image axis, which is written into ``w.look``.
+    It is looked for along the ray with this slope along the image's x axis, which is written into ``w.look``.
     """
     for i in range(3):
-        w.look[i] = s.R_BS[i, 2] + slope * s.R_BS[i, axis]
+        w.look[i] = s.R_BS[i, 2] + slope * s.R_BS[i, 0]
     if s.n_faces == 0:
         for i in range(3):
             w.normal[i] = s.normal_W[i]
@@ -59,10 +60,10 @@ def look_at_surface(s: Record, x: Array, axis: Integer, slope: float, w: Record)
 
 @kernel
 def motion_at_slope(s: Record, window_s: float, axis: Integer, slope: float, w: Record) -> float:
-    """Predict the motion [px] along an image axis at one place on that axis; its Jacobian row into ``w.H[axis]``."""
+    """Predict the motion [px] along an image axis at one place on the x axis; its Jacobian row into ``w.H[axis]``."""
     for i in range(2):
         w.focal_window[i] = s.focal_px[i] * window_s
-    if not look_at_surface(s, w.x, axis, slope, w):
+    if not look_at_surface(s, w.x, slope, w):
         return np.nan
     return pixel_motion(
         w.x, w.p, w.R, w.rate, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state,
@@ -74,24 +75,43 @@ def motion_at_slope(s: Record, window_s: float, axis: Integer, slope: float, w: 
 def motion_of_picture(s: Record, window_s: float, axis: Integer, w: Record) -> float:
     """Predict the motion [px] of the whole picture, its Jacobian row, and add to ``w.variance[axis]`` for its spread.
 
+    The columns that count along the rows (axis 0, to be asked first) are those that count across them (axis 1).
     Sensors without a width (flow chips, blur meters) are compared with their optical axis.
     """
     middle = COLUMNS // 2
     centre = motion_at_slope(s, window_s, axis, 0.0, w)
     if s.half_view == 0.0 or not np.isfinite(centre):
         return centre
+    w.column[middle] = centre
+    for i in range(N_ERROR):
+        w.column_H[middle, i] = w.H[axis, i]
     for k in range(COLUMNS):
-        slope = s.half_view * (2.0 * k - (COLUMNS - 1)) / COLUMNS
-        w.column[k] = motion_at_slope(s, window_s, axis, slope, w) if k != middle else centre
+        if k == middle:
+            continue
+        w.column[k] = motion_at_slope(s, window_s, axis, s.half_view * (2.0 * k - (COLUMNS - 1)) / COLUMNS, w)
         for i in range(N_ERROR):
             w.column_H[k, i] = w.H[axis, i]
-    motion, variance = _together(s.coherence_px, centre, w)
+    motion, variance = _together(s.coherence_px, centre, w) if axis == 0 else _weighted(w)
     for i in range(N_ERROR):
         w.H[axis, i] = 0.0
         for k in range(COLUMNS):
-            w.H[axis, i] += w.weight[k] * w.column_H[k, i]
+            if w.weight[k] > 0.0:  # a column that meets no surface has left no row
+                w.H[axis, i] += w.weight[k] * w.column_H[k, i]
     w.variance[axis] += SPREAD_SHARE**2 * variance
     return motion
+
+
+@kernel
+def _weighted(w: Record) -> tuple[float, float]:
+    """Mean motion [px] of the columns and the variance among them, with the weights in ``w.weight``."""
+    motion, spread = 0.0, 0.0
+    for k in range(COLUMNS):
+        if w.weight[k] > 0.0:
+            motion += w.weight[k] * w.column[k]
+    for k in range(COLUMNS):
+        if w.weight[k] > 0.0:
+            spread += w.weight[k] * (w.column[k] - motion) ** 2
+    return motion, spread
 
 
 @kernel

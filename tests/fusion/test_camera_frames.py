@@ -92,3 +92,36 @@ def test_a_camera_without_a_surface_is_named() -> None:
 def test_something_that_is_no_picture_is_refused_at_construction() -> None:
     with pytest.raises(an.ReadingError, match=r"CameraFrame.image .*\(3,\)"):
         an.CameraFrame(t_ns=0, sensor="cam0", image=np.zeros(3))
+
+
+def climb(dy_px: float | None) -> tuple[an.CorridorEstimator, list[an.Outcome]]:
+    """Flown along the wall at ``SPEED_M_S`` and upwards at half of that, as the displacements of a camera say."""
+    estimator, outcomes, rng = an.CorridorEstimator(config()), [], np.random.default_rng(4)
+    for i in range(400):
+        t_ns = i * 5_000_000
+        estimator.push(an.ImuSample(t_ns=t_ns, sensor="imu0", gyro_rad_s=(0, 0, 0), accel_m_s2=(0, 0, 9.80665)))
+        estimator.push(an.WallRange(t_ns=t_ns, sensor="tof0", range_m=DISTANCE_M))
+        if i % 8 == 0:
+            dx, dy = SHIFT_PX + 0.07 * rng.normal(), None if dy_px is None else dy_px + 0.08 * rng.normal()
+            moved = an.PixelMotion(
+                t_ns=t_ns, sensor="cam0", window_s=PERIOD_NS * 1e-9, dx_px=dx, dy_px=dy, sigma_px=0.07, sigma_dy_px=0.08
+            )
+            outcomes.append(estimator.push(moved))
+    return estimator, outcomes
+
+
+def test_what_a_picture_does_across_its_rows_gives_the_speed_of_climbing() -> None:
+    with_it, _ = climb(-0.5 * SHIFT_PX)
+    without, _ = climb(None)
+    assert with_it.state().velocity_m_s[2] == pytest.approx(0.5 * SPEED_M_S, abs=0.01)
+    assert abs(without.state().velocity_m_s[2] - 0.5 * SPEED_M_S) > 0.1, "nothing else tells"
+
+
+def test_a_wrong_motion_across_does_not_take_the_one_along_with_it() -> None:
+    """As where a cable hangs still in the picture; 40 px are a climb of 6 m/s."""
+    estimator, outcomes = climb(40.0)
+    compared = [outcome for outcome in outcomes if outcome.verdict is not an.Verdict.BLIND]
+    assert len(compared) > 20
+    assert all(outcome.verdict is an.Verdict.FUSED and len(outcome.innovation) == 1 for outcome in compared)
+    assert estimator.state().axial_velocity_m_s == pytest.approx(SPEED_M_S, abs=0.02)
+    assert abs(estimator.state().velocity_m_s[2]) < 0.5

@@ -29,8 +29,8 @@ def looking(surface: Surface = WALL, width_px: int = 320):
     return build_sources(config)[1], w
 
 
-def motion(source, w, window_s: float = 1 / 30) -> float:
-    return motion_of_picture(source, window_s, np.int64(0), w)
+def motion(source, w, window_s: float = 1 / 30, axis: int = 0) -> float:
+    return motion_of_picture(source, window_s, np.int64(axis), w)
 
 
 def columns(source, w, window_s: float = 1 / 30) -> NDArray[np.float64]:
@@ -105,3 +105,41 @@ def test_the_jacobian_is_the_derivative_where_the_columns_agree() -> None:
     slope = (read(0.8 + 1e-4) - read(0.8 - 1e-4)) / 2e-4
     read(0.8)
     assert w["H"][0, E_VEL] == pytest.approx(slope, rel=1e-3)
+
+
+def test_the_jacobian_is_that_of_the_columns_in_use_the_middle_one_included() -> None:
+    """Of a wall that ends beside the middle column on both sides, the middle column is all that is seen."""
+    strip = Face(normal=WALL.normal, offset_m=-WALL_Y_M, start=(-0.1, 2.0, 0.0), end=(0.1, 2.0, 0.0))
+    source, w = looking(Surface(normal=WALL.normal, face=(strip,)))
+    w["x"][3] = 0.8
+    seen = np.isfinite(columns(source, w))
+    assert seen.nonzero()[0].tolist() == [COLUMNS // 2]
+    motion(source, w)
+    assert w["H"][0, E_VEL : E_VEL + 2] == pytest.approx([-FOCAL_PX / 30 / WALL_Y_M, 0.0], abs=1e-12)
+
+
+def test_climbing_past_a_wall_moves_the_picture_down_its_columns() -> None:
+    """Up the stairs: f v T / Z along the rows by what is flown along, and across them by what is climbed."""
+    source, w = looking()
+    w["x"][3], w["x"][5] = 0.9, 0.5
+    assert motion(source, w) == pytest.approx(-FOCAL_PX * 0.9 / 30 / WALL_Y_M)
+    assert motion(source, w, axis=1) == pytest.approx(FOCAL_PX * 0.5 / 30 / WALL_Y_M)
+    assert w["H"][1, E_VEL : E_VEL + 3] == pytest.approx([0.0, 0.0, FOCAL_PX / 30 / WALL_Y_M], abs=1e-12)
+
+
+def test_what_goes_across_is_seen_in_the_columns_that_the_rows_follow() -> None:
+    """Two walls, one four times as far: the columns of the far one are left out along, and so they are across."""
+    near = Face(normal=WALL.normal, offset_m=-WALL_Y_M, start=(-9.0, 2.0, 0.0), end=(0.4, 2.0, 0.0))
+    far = Face(normal=WALL.normal, offset_m=-8.0, start=(-50.0, 8.0, 0.0), end=(50.0, 8.0, 0.0))
+    source, w = looking(Surface(normal=WALL.normal, face=(near, far)))
+    w["x"][3], w["x"][5] = 1.5, 0.5
+    motion(source, w)
+    assert motion(source, w, axis=1) == pytest.approx(FOCAL_PX * 0.5 / 30 / WALL_Y_M, rel=0.01)
+
+
+def test_rolling_about_the_axis_moves_both_sides_of_the_picture_apart_and_its_middle_not() -> None:
+    source, w = looking()
+    w["x"][3], w["rate"][1] = 0.5, 0.3  # the camera looks along the body's y axis
+    motion(source, w)
+    assert motion(source, w, axis=1) == pytest.approx(0.0, abs=1e-9)
+    assert np.sqrt(w["variance"][1]) > 0.1

@@ -104,6 +104,7 @@ def test_any_numbers_read_back_equal(
                 "dy_px": values[:, 2],
                 "sigma_px": nothing,
                 "quality": nothing,
+                "sigma_dy_px": nothing,
             },
         ),
         "uwb0": SensorTable(
