@@ -18,16 +18,14 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import msgspec
 
 from axialnav.fusion.live.cli import SWITCH_S
 from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.recording import FlightRecording
-from axialnav.fusion.live.vehicle import CameraInput, Vehicle
 from axialnav.fusion.live.warm_up import warm_up
 from tests.bench import live_bytes, live_hour
 from tests.bench.markdown import machine, number, table
-from tests.fusion.live.filmed import Shutter, clean_errors, filmed_course, render
+from tests.fusion.live.filmed import Shutter, clean_errors, filmed_course, render, with_camera
 from tests.fusion.live.sender_process import SenderProcess, Told
 from tests.fusion.live.streamed import (
     SCENE,
@@ -60,11 +58,6 @@ class Reel(Shutter):
 
     def _recorded(self) -> Iterator[tuple[int, Any]]:
         yield from self._pictures
-
-
-def with_camera(vehicle: Vehicle) -> Vehicle:
-    """The vehicle with a camera whose pictures the bench provides."""
-    return msgspec.structs.replace(vehicle, camera=CameraInput(source="memory", sensor="cam0"))
 
 
 class Flown:

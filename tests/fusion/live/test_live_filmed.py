@@ -9,17 +9,14 @@ import time
 from itertools import islice
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
 from axialnav.fusion.camera_feed import CameraFeed
 from axialnav.fusion.config import Config
-from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.recorder.limits import Limits
 from axialnav.fusion.live.recording import FlightRecording
-from axialnav.fusion.live.vehicle import CameraInput, Vehicle
 from axialnav.fusion.live.warm_up import wall_pictures, warm_up
 from axialnav.fusion.readings import CameraFrame
 from axialnav.models.rig import Camera, Imu, Surface
@@ -30,11 +27,10 @@ from tests.fusion.live.accounts import (
     account_for_every_serial_frame,
     recorded_is_what_was_pushed,
     the_recording_replays_to_the_last_bit,
-    wait_for,
 )
 from tests.fusion.live.contract import ContractPx4
-from tests.fusion.live.filmed import Shutter, clean_errors, filmed_course, fused_errors, heard, render
-from tests.fusion.live.streamed import Air, StreamedVehicle, rms, vehicle_of
+from tests.fusion.live.filmed import FilmedFlight, clean_errors, fused_errors, heard, render
+from tests.fusion.live.streamed import Air, rms
 
 SECONDS, STILL_S = 10.0, 2.0
 BAD = Air(jitter_s=0.002, lost=0.05, reordered=0.05, damaged=0.10, seed=5)
@@ -53,25 +49,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
 
 
-def with_camera(vehicle: Vehicle) -> Vehicle:
-    return msgspec.structs.replace(vehicle, camera=CameraInput(source="folder", sensor="cam0"))
-
-
 def test_a_filmed_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounted(folder: Path, tmp_path: Path) -> None:
-    course = filmed_course(folder)
-    streamed, shutter = StreamedVehicle(course, BAD), Shutter(folder, course.config)
-    vehicle = with_camera(vehicle_of(course.config, streamed.port, streamed.ttys))
-    warm_up(vehicle.filter, vehicle.estimator)
-    node = Node(vehicle, source=shutter, recording=FlightRecording(tmp_path, True, time.monotonic_ns))
-    node.start()
-    streamed.start()
-    shutter.release(streamed.t0_ns)
-    try:
-        assert wait_for(lambda: streamed.now_s() > SECONDS + 0.3, 60.0)
-        status = node.status()
-    finally:
-        node.close()
-        streamed.close()
+    with FilmedFlight(folder, air=BAD, recording=FlightRecording(tmp_path, True, time.monotonic_ns)) as flight:
+        assert flight.until(SECONDS + 0.3)
+        status = flight.node.status()
+    node, streamed = flight.node, flight.streamed
     assert node.failure == ""
     account_for_every_message(streamed, status)
     account_for_every_serial_frame(streamed, status)
@@ -84,30 +66,18 @@ def test_a_filmed_flight_over_a_bad_link_is_as_good_and_nothing_is_lost_uncounte
     the_recording_replays_to_the_last_bit(path, node)
     from_s = (status["filter"]["began_ns"] - streamed.t0_ns) * 1e-9 - 1e-3
     clean = rms(clean_errors(folder, from_s, STILL_S, SECONDS - 0.2))
-    fused = rms(fused_errors(path, course, streamed.t0_ns, STILL_S, SECONDS - 0.2))
+    fused = rms(fused_errors(path, flight.course, streamed.t0_ns, STILL_S, SECONDS - 0.2))
     assert fused < SCATTER * clean
 
 
 def test_the_camera_freezes_for_a_while(folder: Path) -> None:
     """From 4 s to 5.5 s the driver gives the same pixels with fresh stamps; nothing else sees the axis."""
-    course = filmed_course(folder)
-    config = msgspec.structs.replace(course.config, disabled=("uwb0",))
-    streamed = StreamedVehicle(course, contract=ContractPx4())
-    shutter = Shutter(folder, config, frozen_s=(4.0, 5.5))
-    ttys = {sensor: device for sensor, device in streamed.ttys.items() if sensor != "uwb0"}
-    vehicle = with_camera(vehicle_of(config, streamed.port, ttys, profile="px4"))
-    warm_up(vehicle.filter, vehicle.estimator)
-    node, said = Node(vehicle, source=shutter), []
-    node.start()
-    streamed.start()
-    shutter.release(streamed.t0_ns)
-    try:
+    said = []
+    with FilmedFlight(folder, contract=ContractPx4(), profile="px4", without=("uwb0",), frozen_s=(4.0, 5.5)) as flight:
+        streamed, node = flight.streamed, flight.node
         while streamed.now_s() < 9.0:
             time.sleep(0.02)
             said.append((streamed.now_s(), "cam0" in node.core.silent(time.monotonic_ns())))
-    finally:
-        node.close()
-        streamed.close()
     assert node.failure == ""
     sent = [m for _, m in streamed.contract.messages if m.get_type() == "ODOMETRY"]
     t = np.array([(m.time_usec * 1000 - streamed.t0_ns) * 1e-9 for m in sent])
@@ -134,21 +104,10 @@ def test_a_disk_that_cannot_keep_up_costs_pictures_and_nothing_else(
         return write(file, data)
 
     monkeypatch.setattr(os, "write", slowly)
-    course = filmed_course(folder)
-    streamed, shutter = StreamedVehicle(course), Shutter(folder, course.config)
-    vehicle = with_camera(vehicle_of(course.config, streamed.port, streamed.ttys))
-    warm_up(vehicle.filter, vehicle.estimator)
     recording = FlightRecording(tmp_path, True, time.monotonic_ns, Limits(picture_queue=1 << 20))
-    node = Node(vehicle, source=shutter, recording=recording)
-    node.start()
-    streamed.start()
-    shutter.release(streamed.t0_ns)
-    try:
-        assert wait_for(lambda: streamed.now_s() > 8.0, 60.0)
-    finally:
-        node.close()
-        streamed.close()
-    status = node.status()
+    with FilmedFlight(folder, recording=recording) as flight:
+        assert flight.until(8.0)
+    node, status = flight.node, flight.node.status()
     recorded = status["recording"]
     assert node.failure == ""
     assert set(recorded["dropped"]) == {"cam0/picture"}
@@ -156,7 +115,7 @@ def test_a_disk_that_cannot_keep_up_costs_pictures_and_nothing_else(
     assert recorded["dropped"]["cam0/picture"] > 60
     seen = sum(status["camera"][what] for what in ("measured", "refused", "unusable"))
     assert recorded["written"]["cam0/picture"] + recorded["dropped"]["cam0/picture"] == seen > 120
-    assert np.abs(streamed.axial_errors(STILL_S, 7.8)).max() < 0.2
+    assert np.abs(flight.streamed.axial_errors(STILL_S, 7.8)).max() < 0.2
     (path,) = tmp_path.glob("*.mcap")
     the_recording_replays_to_the_last_bit(path, node)
 
