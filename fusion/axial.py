@@ -262,7 +262,7 @@ class AxialFilter:
     def _fuse(self, axes: int, s: Any, core: Any, w: Any) -> None:
         """Gate a reading and correct both parts of the state with it; its record goes to ``w.row``."""
         P, H, row = core["P"][0], w["H"][:axes].copy(), w["row"]
-        y, variance = (w["z"] - w["h"])[:axes], w["variance"][:axes] * float(w["repeated"])
+        y, variance = (w["z"] - w["h"])[:axes], w["variance"][:axes]
         S = H @ P @ H.T + np.diag(variance)
         nis = float(y @ np.linalg.solve(S, y)) if np.isfinite(S).all() else math.nan
         if not math.isfinite(nis):
@@ -274,7 +274,7 @@ class AxialFilter:
         row[LOG_INNOVATION : LOG_INNOVATION + axes], row[LOG_VARIANCE : LOG_VARIANCE + axes] = y, np.diag(S)
         row[LOG_NIS], row[LOG_GATE], row[LOG_WEIGHT], row[LOG_REASON] = nis, gate, weight, w["refused"]
         if weight > MIN_WEIGHT:
-            self._correct(H, y, np.diag(variance / weight), core, w)
+            self._correct(H, y, np.diag(variance * float(w["repeated"]) / weight), core, w)
 
     def _correct(self, H: Array, y: Array, R: Array, core: Any, w: Any) -> None:
         """Update the four states by filterpy, and what is held by its own rule."""

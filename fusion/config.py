@@ -196,9 +196,14 @@ class HeightTuning(_Table, frozen=True, kw_only=True):
 
 
 class AttitudeTuning(_Table, frozen=True, kw_only=True):
-    """Noise of the autopilot's attitude."""
+    """Noise of the autopilot's attitude.
+
+    It is the output of a filter of its own: errors are alike over ``correlation_time_s``, many readings within it count
+    as one.
+    """
 
     sigma_rad: Positive = 0.05
+    correlation_time_s: NonNegative = 0.5
     gate: Gate = Gate()
 
 

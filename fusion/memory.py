@@ -174,7 +174,7 @@ def new_scratch() -> Records:
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
     "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_time_s", "uwb_bias_length_m",
-    "wall_offset_walk", "uwb_correlation_s", "height_correlation_s", "doubt_m_s2", "doubt_sigmas", "doubt_time_s",
+    "wall_offset_walk", "doubt_m_s2", "doubt_sigmas", "doubt_time_s",
     "trial_s", "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
     "reanchor_aided_s", "reanchor_alone_s",
     "supervised", "timeout_s", "shadow_m_s2", "kinematic_m", "kinematic_sigmas", "agree_s", "fit_m", "anchor_m",
@@ -223,8 +223,6 @@ def build_settings(config: Config) -> Records:
         "uwb_bias_time_s": config.uwb.bias_time_s,
         "uwb_bias_length_m": config.uwb.bias_length_m,
         "wall_offset_walk": config.range.offset_walk_m**2,
-        "uwb_correlation_s": config.uwb.correlation_time_s,
-        "height_correlation_s": config.height.correlation_time_s,
         "doubt_m_s2": fault.doubt_m_s2 if fault.enabled else np.inf,
         "doubt_sigmas": fault.doubt_sigmas,
         "doubt_time_s": fault.doubt_time_s,

@@ -19,7 +19,6 @@ from axialnav.fusion.events import Events, Table, pack_tables
 from axialnav.fusion.handedness import mirror_config, mirror_tables
 from axialnav.fusion.kernels.measure import repetition
 from axialnav.fusion.kernels.run import mean_gap, run
-from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, build_settings, new_memory, new_scratch
 from axialnav.fusion.outcome import InnovationLog, Verdict
 from axialnav.fusion.sources import Kind, Records, build_sources
@@ -156,12 +155,12 @@ class Rehearsal:
 
     def _pack(self, config: Config, src: Records) -> Packed:
         """Events in their order; delays and the correlation time change it, nothing else that can be tried does."""
-        key = repr((sorted(config.delay.late_s.items()), config.uwb.correlation_time_s))
+        key = repr((sorted(config.delay.late_s.items()), src["correlation_s"].tolist()))
         packed = self._packed.get(key)
         if packed is None:
             events = pack_tables(config, self._tables)
             read = src["kind"][events.source] != int(Kind.IMU)
-            packed = Packed(events, read, _repetition(events, read, src, config.uwb.correlation_time_s))
+            packed = Packed(events, read, _repetition(events, read, src))
             self._packed = {**dict(list(self._packed.items())[1 - KEPT :]), key: packed}
         return packed
 
@@ -169,9 +168,9 @@ class Rehearsal:
 def likelihood_terms(log: InnovationLog, packed: Packed) -> Terms:
     """Parts of the likelihood of every reading of a log.
 
-    Neighbouring UWB errors are alike, and what the filter's bias states leave of that must not decide: a reading counts
-    as one over the number of readings that repeat each other (:func:`axialnav.fusion.kernels.measure.repetition`), as
-    it does where the filter itself weighs evidence.
+    Neighbouring errors are alike, and what the filter's bias states leave of that must not decide: a reading counts as
+    one over the number of readings that repeat each other (:func:`axialnav.fusion.kernels.measure.repetition`), as it
+    does where the filter itself weighs evidence.
 
     Parameters
     ----------
@@ -193,14 +192,13 @@ def likelihood_terms(log: InnovationLog, packed: Packed) -> Terms:
     )
 
 
-def _repetition(events: Events, read: NDArray[np.bool_], src: Records, correlation_s: float) -> Array:
+def _repetition(events: Events, read: NDArray[np.bool_], src: Records) -> Array:
     """How many readings say the same as each one, (n,)."""
     t_ns, source = events.t_ns[read], events.source[read]
     repeated = np.ones(t_ns.size)
-    for index in range(len(src)):
-        if is_uwb(int(src["kind"][index])):
-            rows = np.flatnonzero(source == index)
-            repeated[rows] = [repetition(gap, correlation_s) for gap in _gaps(t_ns[rows])]
+    for index in np.flatnonzero(src["correlation_s"]):
+        rows = np.flatnonzero(source == index)
+        repeated[rows] = [repetition(gap, float(src["correlation_s"][index])) for gap in _gaps(t_ns[rows])]
     return repeated
 
 

@@ -51,6 +51,7 @@ SOURCE = np.dtype(
         ("enabled", "?"),
         ("sigma", "f8"),
         ("bias_variance", "f8"),  # of a UWB path [m^2]
+        ("correlation_s", "f8"),  # over which errors are alike, 0: not at all
         ("first_path", "i8"),  # number of its anchor 0 among the paths of all sources
         ("gate", "f8", 3),  # chi-square threshold for 1, 2, 3 axes
         ("soft_nis", "f8"),
@@ -140,6 +141,7 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         "enabled": name not in config.disabled,
         "sigma": sigma,
         "bias_variance": _bias_sigma(spec, config) ** 2,
+        "correlation_s": correlation_s(spec, config),
         "gate": [chi_square_threshold(dof, gate.probability) for dof in (1, 2, 3)],
         "soft_nis": gate.soft_sigma**2,
         "R_BS": spec.rotation_BS,
@@ -189,6 +191,24 @@ def _surface(sensor: str, name: str, config: Config) -> Surface:
         known = ", ".join(config.surface) or "none"
         raise ConfigError(f"sensor.{sensor} looks at surface {name!r}, which is not described; surfaces: {known}")
     return config.surface[name]
+
+
+def correlation_s(spec: AnySensor, config: Config) -> float:
+    """Time over which the errors of a sensor are alike [s], 0 where neighbouring readings have nothing in common."""
+    match spec:
+        case Uwb():
+            return config.uwb.correlation_time_s
+        case Barometer():
+            return config.height.correlation_time_s
+        case AttitudeSource():
+            return config.attitude.correlation_time_s
+        case _:
+            return 0.0
+
+
+def counts_as_fewer(spec: AnySensor, config: Config) -> bool:
+    """Whether neighbouring readings of a sensor err alike and no bias state takes that up."""
+    return correlation_s(spec, config) > 0.0 and _bias_sigma(spec, config) == 0.0
 
 
 def _bias_sigma(spec: AnySensor, config: Config) -> float:

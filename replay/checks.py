@@ -121,8 +121,9 @@ def _look_up(metrics: Mapping[str, Any], path: str, star: tuple[str, ...]) -> An
 
 
 def _value(limit: Limit, metrics: Mapping[str, Any], star: tuple[str, ...]) -> float:
-    if limit.unless is not None and _look_up(metrics, limit.unless, star):
-        raise _AbsentError(f"skipped because of {limit.unless.rpartition('.')[2]}")
+    for path in (limit.unless,) if isinstance(limit.unless, str) else limit.unless:
+        if _look_up(metrics, path, star):
+            raise _AbsentError(f"skipped because of {path.rpartition('.')[2]}")
     value = _number(limit, _look_up_or_default(limit, metrics, star))
     if limit.divided_by:
         total = sum(_finite(_look_up(metrics, path, star)) for path in limit.divided_by)

@@ -81,26 +81,29 @@ def replay(
 def demo(*, out: Path = Path("runs/demo")) -> int:
     """Fly a simulated corridor with camera frames (straight, stairs, a reflecting corner), replay and report it.
 
-    The last line is the verdict of `axialnav check` with its own limits, and so is the exit code.
+    It ends with the verdict of `axialnav check` with its own limits, after what is not passed; so is the exit code.
 
     Parameters
     ----------
     out
         Run folder to write; the flight itself goes into its folder flight.
     """
-    from axialnav.replay.checks import EXIT_CODES, check_metrics, verdict
+    from axialnav.replay.checks import EXIT_CODES, Judgement, check_metrics, verdict
     from axialnav.replay.flight import load_flight
     from axialnav.replay.limits_file import read_limits
     from axialnav.replay.run import replay as run_replay
-    from axialnav.replay.simulate.demo import fly_demo, rehearsed
+    from axialnav.replay.simulate.demo import NO_MARGIN, fly_demo, rehearsed
 
     _refuse_flight_folder(out)
     with progress_bar("demo: fly") as progress, rehearsed():
         fly_demo(out / "flight", progress)
     with progress_bar("demo: replay") as progress:
-        run = run_replay(load_flight(out / "flight"), progress=progress)
+        run = run_replay(load_flight(out / "flight"), params=NO_MARGIN, progress=progress)
     _finish(run, out)
-    overall = verdict(check_metrics(run.metrics, read_limits()))
+    checks = check_metrics(run.metrics, read_limits())
+    for bad in (c for c in checks if c.judgement in (Judgement.WARN, Judgement.FAIL)):
+        emit(f"{bad.judgement:<10} {bad.name} is {bad.value:.3g}, {bad.limit}: {bad.reason}")
+    overall = verdict(checks)
     emit(f"verdict    {overall}   every check: axialnav check {out}")
     return EXIT_CODES[overall]
 

@@ -35,7 +35,7 @@ class Limit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     warn_outside
         Path of a pair ``[low, high]`` outside of which the check warns.
     unless
-        Path of a truth value; where it is true the check is skipped as not evaluated.
+        Path of a truth value, or several; where one is true the check is skipped as not evaluated.
     if_absent
         What it means that the last key of ``metric`` is missing while the table that would hold it is there.
     required
@@ -52,7 +52,7 @@ class Limit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     warn_below: float | None = None
     fail_below: float | None = None
     warn_outside: Path_ | None = None
-    unless: Path_ | None = None
+    unless: Path_ | tuple[Path_, ...] = ()
     if_absent: float | None = None
     required: bool = False
     why: str = ""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.outcome import REASONS, InnovationLog, Reason, Track, Verdict
-from axialnav.fusion.sources import Kind, kind_of
+from axialnav.fusion.sources import Kind, counts_as_fewer, kind_of
 from axialnav.replay.series import lag1_autocorrelation
 
 if TYPE_CHECKING:
@@ -31,7 +31,8 @@ def sensor_metrics(
     """Counts, normalised innovations and silences per sensor.
 
     Beside the keys of the contract: ``reasons`` (count per sentence, fused ones apart), ``unprocessed`` (readings that
-    never reached the filter, e.g. before the first IMU sample) and ``disabled``.
+    never reached the filter, e.g. before the first IMU sample), ``disabled``, and ``correlated`` (neighbouring readings
+    are known to err alike and count as fewer).
     """
     result: dict[str, dict[str, Any]] = {}
     for name in fusable(config, tables):
@@ -56,6 +57,7 @@ def _one(
         "reasons": _reasons(log.reason[rows]),
         "unprocessed": 0 if disabled else available - int(rows.size),
         "disabled": disabled,
+        "correlated": counts_as_fewer(config.sensor[name], config),
     }
 
 

@@ -88,7 +88,8 @@ def _sensors(metrics: dict[str, Any]) -> Iterator[str]:
     yield from aligned([head, *rows], left=(0, len(head) - 1))
     for name, sensor in metrics["sensors"].items():
         if sensor["unprocessed"]:
-            yield f"           {name}: {_count(sensor['unprocessed'])} readings lie outside the IMU's time span"
+            many = _count(sensor["unprocessed"])
+            yield f"           {name}: {many} outside the IMU's time span, or pictures before a first full window"
     if not any(sensor["fused"] for sensor in metrics["sensors"].values()):
         yield "warning    no reading was fused: this is dead reckoning from the first state"
 

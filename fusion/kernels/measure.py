@@ -67,12 +67,13 @@ def measure(
         w.z[0] = values[0]
         w.h[0] = height(w.p, seen.datum_m, w.H[0])
         w.variance[0] = variance_of(values[1], s.sigma)
-        w.repeated = repetition(seen.gap_s, c.height_correlation_s)
+        w.repeated = repetition(seen.gap_s, s.correlation_s)
         return 1
     for i in range(2):
         w.h[i] = tilt(w.R, i, w.H[i])
         w.z[i] = w.h[i] + wrapped(values[i] - w.h[i])
         w.variance[i] = variance_of(values[3], s.sigma)
+    w.repeated = repetition(seen.gap_s, s.correlation_s)
     return 2
 
 
@@ -118,7 +119,7 @@ def _uwb_variance(claimed_sigma: float, place: int, other: int, s: Record, seen:
     """White variance of a reading; paths without a place add their bias and make readings repeat each other."""
     variance = variance_of(claimed_sigma, s.sigma)
     if place < 0 or other < 0:
-        w.repeated = repetition(seen.gap_s, c.uwb_correlation_s)
+        w.repeated = repetition(seen.gap_s, s.correlation_s)
         variance += ((1.0 if place < 0 else 0.0) + (1.0 if other < 0 else 0.0)) * s.bias_variance
     return variance
 

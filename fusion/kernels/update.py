@@ -51,8 +51,9 @@ def redescend(nis_per_axis: float, soft_nis: float) -> float:
 def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record, w: Record, c: Record) -> float:
     """Try one reading on filter ``row``; leave its record in ``w.row`` (11,) and return its log-likelihood, in a trial.
 
-    The log-likelihood is bounded (the NIS counts at most as much as the gate) and that of UWB divided by the number of
-    readings that repeat each other: what bias states leave of their likeness must not decide over the accelerometer.
+    The log-likelihood is bounded (the NIS counts at most as much as the gate) and divided by the number of readings
+    that repeat each other, for UWB also where bias states take that up: what they leave of it must not decide over the
+    accelerometer.  A reading is gated by its own variance, and fused with that of all that say the same.
     Axes of one reading are gated together and fused one after the other.
     """
     x, P = m.x[row], m.P[row]
@@ -67,8 +68,7 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     w.would = 0.0
     if axes < 0:
         return 0.0
-    repeated = w.repeated
-    nis, det = _innovate(axes, repeated, P, w)
+    nis, det = _innovate(axes, P, w)
     if not np.isfinite(nis):
         w.row[LOG_CODE] = -NOT_FINITE
         return 0.0
@@ -77,39 +77,38 @@ def fuse(row: int, t_ns: int, s: Record, seen: Record, values: Array, m: Record,
     weight = w.would if w.refused == 0 else 0.0
     w.row[LOG_NIS], w.row[LOG_GATE], w.row[LOG_WEIGHT] = nis, gate, weight
     if weight > MIN_WEIGHT:
-        _apply(axes, repeated, repeated / weight, x, P, w)
+        _apply(axes, w.repeated / weight, x, P, w)
         if row == 0:
             for k in range(3):
                 m.correction[k] += w.step[E_VEL + k]
                 m.correction_variance[k] += w.spread[k]
     elif row == 0 and w.refused == 0:
-        _note_refused(axes, repeated, REFUSED_COUNTS * math.sqrt(gate / nis), P, m, w)
+        _note_refused(axes, REFUSED_COUNTS * math.sqrt(gate / nis), P, m, w)
     if w.refused > 0:
         w.row[LOG_REASON] = w.refused
         return 0.0
     if m.on_trial == 0:
         return 0.0  # nobody asks
-    alike = repetition(seen.gap_s, c.uwb_correlation_s) if is_uwb(s.kind) else 1.0
-    return float(-0.5 * (min(nis, gate) + math.log(det)) / alike)
+    return float(-0.5 * (min(nis, gate) + math.log(det)) / repetition(seen.gap_s, s.correlation_s))
 
 
 @kernel
-def _note_refused(axes: int, repeated: float, cap: float, P: Array, m: Record, w: Record) -> None:
+def _note_refused(axes: int, cap: float, P: Array, m: Record, w: Record) -> None:
     """Add the correction of velocity that a refused reading asks for, as if it lay a little outside its gate."""
     for i in range(axes):
-        S = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
+        S = project(P, w.H[i], w.PHt) + w.variance[i] * w.repeated
         for k in range(3):
             m.correction[k] += w.PHt[E_VEL + k] / S * cap * (w.z[i] - w.h[i])
             m.correction_variance[k] += w.PHt[E_VEL + k] * w.PHt[E_VEL + k] / S
 
 
 @kernel
-def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, float]:
+def _innovate(axes: int, P: Array, w: Record) -> tuple[float, float]:
     """Normalised innovation squared of all axes jointly, and det S, by one elimination pass."""
     S, y = w.S, w.y
     for i in range(axes - 1, -1, -1):  # the first axis last: the update begins with its P H'
         y[i] = w.z[i] - w.h[i]
-        S[i, i] = project(P, w.H[i], w.PHt) + w.variance[i] * repeated
+        S[i, i] = project(P, w.H[i], w.PHt) + w.variance[i]
         w.row[LOG_INNOVATION + i] = y[i]
         w.row[LOG_VARIANCE + i] = S[i, i]
         for j in range(i):
@@ -132,7 +131,7 @@ def _innovate(axes: int, repeated: float, P: Array, w: Record) -> tuple[float, f
 
 
 @kernel
-def _apply(axes: int, repeated: float, inflation: float, x: Array, P: Array, w: Record) -> None:
+def _apply(axes: int, inflation: float, x: Array, P: Array, w: Record) -> None:
     """Fuse the axes one by one; each innovation is taken after the corrections before it (to first order).
 
     ``w.S`` and ``w.PHt`` are as :func:`_innovate` leaves them.
@@ -143,7 +142,7 @@ def _apply(axes: int, repeated: float, inflation: float, x: Array, P: Array, w: 
         w.spread[k] = 0.0
     for i in range(axes):
         if i == 0:
-            S = w.S[0, 0] + w.variance[0] * (inflation - repeated)
+            S = w.S[0, 0] + w.variance[0] * (inflation - 1.0)
         else:
             S = project(P, w.H[i], w.PHt) + w.variance[i] * inflation
         innovation = w.z[i] - w.h[i]

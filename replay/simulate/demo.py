@@ -20,6 +20,10 @@ from axialnav.replay.simulate.mission_checks import check_mission
 
 REHEARSED_S = 5.0
 SOURCE = 'source = "axialnav simulate"'
+NO_MARGIN = {  # simulated inertial units state the noise that they have in flight, so that no margin is needed
+    "imu.accel_noise_scale": "1.0",
+    "imu.gyro_noise_scale": "1.0",
+}
 
 
 def demo_mission() -> Mission:

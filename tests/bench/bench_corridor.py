@@ -1,8 +1,10 @@
-"""The whole chain from frames on simulated corridors: ``python -m tests.bench.bench_corridor [SEEDS] [SECONDS]``.
+"""The whole chain from frames on simulated corridors.
+
+``python -m tests.bench.bench_corridor [SEEDS] [SECONDS] [SECTION ...] [workers=N]``
 
 Each seed flies one section after another past walls from strong to nearly blank; every number is over all seeds.  The
-score of every flight is kept in ``runs/bench-corridor``, so that a bench that was interrupted goes on where it was, and
-two may run at a time, each with some of the sections; scores of another version of the source are not taken.
+score of every flight is kept in ``runs/bench-corridor``, so that a bench that was interrupted goes on where it was;
+scores of another version of the source are not taken.  ``workers`` flights are flown at a time.
 """
 
 from __future__ import annotations
@@ -10,7 +12,9 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from dataclasses import asdict, dataclass
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import msgspec
@@ -21,6 +25,7 @@ import axialnav
 from axialnav.models.jit import source_stamp
 from axialnav.replay.experiments.field import paper_speed
 from axialnav.replay.flight import Truth, load_flight
+from axialnav.replay.frames import with_pixel_motion
 from axialnav.replay.run import Run, replay
 from axialnav.replay.simulate.flight import simulate
 from axialnav.replay.simulate.mission import CameraPlan, Mission, WallLook
@@ -73,7 +78,8 @@ def fly(section: str, seed: int, seconds: float) -> list[Score]:
         simulate(mission_of(section, seed, seconds), Path(folder) / "flight", seed=seed)
         flight = load_flight(Path(folder) / "flight")
         assert flight.truth is not None
-        fused = [score(replay(flight, without=without), section, flight.truth) for without in ((), ("uwb0",))]
+        seen = replace(flight, tables=with_pixel_motion(flight, flight.config, flight.tables))  # once for both replays
+        fused = [score(replay(seen, without=without), section, flight.truth) for without in ((), ("uwb0",))]
         _, error, windows = paper_speed(flight)
     rmse = float(np.sqrt((error**2).mean())) if error.size else np.nan
     worst = float(np.abs(error).max()) if error.size else np.nan
@@ -130,8 +136,18 @@ def row(section: str, estimate: str, scores: list[Score]) -> list[str]:
     ]  # fmt: skip
 
 
-def main(seeds: int, seconds: float, sections: tuple[str, ...] = tuple(ASKED_M_S)) -> str:
+def fly_ahead(seeds: int, seconds: float, sections: tuple[str, ...], workers: int) -> None:
+    """Have the scores of all flights kept, ``workers`` flights at a time."""
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        waiting = [pool.submit(flown, section, seed, seconds) for section in sections for seed in range(seeds)]
+        for one in waiting:
+            one.result()
+
+
+def main(seeds: int, seconds: float, sections: tuple[str, ...] = tuple(ASKED_M_S), workers: int = 1) -> str:
     """Fly everything; the table in Markdown."""
+    if workers > 1:
+        fly_ahead(seeds, seconds, sections, workers)
     rows = []
     for section in sections:
         flights = [flown(section, seed, seconds) for seed in range(seeds)]
@@ -141,10 +157,12 @@ def main(seeds: int, seconds: float, sections: tuple[str, ...] = tuple(ASKED_M_S
 
 
 if __name__ == "__main__":
+    words = [word for word in sys.argv[1:] if not word.startswith("workers=")]
     print(
         main(
-            int(sys.argv[1]) if len(sys.argv) > 1 else SEEDS,
-            float(sys.argv[2]) if len(sys.argv) > 2 else SECONDS,
-            tuple(sys.argv[3:]) or tuple(ASKED_M_S),
+            int(words[0]) if words else SEEDS,
+            float(words[1]) if len(words) > 1 else SECONDS,
+            tuple(words[2:]) or tuple(ASKED_M_S),
+            next((int(word.removeprefix("workers=")) for word in sys.argv[1:] if word.startswith("workers=")), 1),
         )
     )

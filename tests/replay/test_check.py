@@ -75,6 +75,15 @@ def test_stars_stand_for_every_sensor_and_divide_row_by_row() -> None:
     assert "disabled" in shares[2].reason
 
 
+def test_one_of_several_reasons_is_enough_to_skip_a_check() -> None:
+    sensors = {"baro0": {"lag1": 0.9, "disabled": False, "correlated": True}}
+    sensors |= {"uwb0": {"lag1": 0.9, "disabled": False, "correlated": False}}
+    limit = Limit(metric="sensors.*.lag1", unless=("sensors.*.disabled", "sensors.*.correlated"), warn_above=0.4)
+    skipped, judged = check_metrics({"sensors": sensors}, {"white": limit})
+    assert (skipped.judgement, skipped.reason) == (Judgement.NOT_EVALUATED, "skipped because of correlated")
+    assert judged.judgement is Judgement.WARN
+
+
 @pytest.mark.parametrize(("take", "value"), [("count", 2.0), ("longest", 1.5), ("total", 2.0)])
 def test_intervals_are_counted_and_measured(take: Any, value: float) -> None:
     assert judge(metric="sensors.*.timeouts", take=take, fail_above=10.0)[0] == ("PASS", value)

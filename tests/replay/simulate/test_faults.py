@@ -12,6 +12,7 @@ import pytest
 from axialnav.fusion.errors import ConfigError
 from axialnav.models.rig import AttitudeSource, Barometer, RangeFinder
 from axialnav.replay.flight import Flight
+from axialnav.replay.run import replay
 from axialnav.replay.simulate.flight import fly_mission, sensed
 from axialnav.replay.simulate.mission import ORDINARY_FAULTS, Fault, read_mission
 from axialnav.replay.simulate.scenarios import mission_of
@@ -114,3 +115,12 @@ def test_the_wall_range_is_as_noisy_as_stated(faultless: Flight) -> None:
     noise = np.diff(ranges) / np.sqrt(2.0)
     assert len(ranges) > 60
     assert np.std(noise) == pytest.approx(finder.sigma_m, rel=0.25)
+
+
+def test_the_filter_finds_every_sensor_as_noisy_as_it_is_stated() -> None:
+    """Mean NIS near 1, slow errors included: a barometer's and an attitude's are those of one reading, not of many."""
+    mission = msgspec.structs.replace(mission_of("mission", duration_s=40.0, uwb="clean"))
+    run = replay(sensed(fly_mission(mission, 6), Path("unused"), frames=False))
+    found = {name: sensor["mean_nis"] for name, sensor in run.metrics["sensors"].items()}
+    assert set(found) == {"att0", "baro0", "tof0", "tof1", "uwb0"}
+    assert all(0.2 < nis < 2.0 for nis in found.values()), found
