@@ -307,13 +307,13 @@ def textbook(config: Config) -> Config:
     """The plain extended Kalman filter: no redescending weights, readings independent, everything believed."""
     change = msgspec.structs.replace
     wide = Gate(probability=NEVER, soft_sigma=1e9)
-    height = change(config.height, gate=wide, correlation_time_s=0.0)
+    slow = ("height", "attitude")
     return change(
         config,
         uwb=UwbTuning(bias_sigma_m=0.0, correlation_time_s=0.0, sigma_m=0.01, fix_sigma_m=0.01, gate=wide),
         imu=ImuTuning(accel_noise_scale=1.0, gyro_noise_scale=1.0),
-        **{name: change(getattr(config, name), gate=wide) for name in ("flow", "range", "attitude")},
-        height=height,
+        **{name: change(getattr(config, name), gate=wide) for name in ("flow", "range")},
+        **{name: change(getattr(config, name), gate=wide, correlation_time_s=0.0) for name in slow},
         imu_fault=change(config.imu_fault, enabled=False),
         supervisor=change(config.supervisor, enabled=False),
     )
