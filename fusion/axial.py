@@ -29,6 +29,7 @@ from axialnav.fusion.kernels.measure import measure
 from axialnav.fusion.kernels.propagate import rotate_sample
 from axialnav.fusion.kernels.run import conclude, receive
 from axialnav.fusion.kernels.shadow import carry_shadow, note_velocity
+from axialnav.fusion.kernels.shaking import note_shaking
 from axialnav.fusion.kernels.supervise import end_block
 from axialnav.fusion.kernels.update import MIN_WEIGHT, redescend
 from axialnav.fusion.kernels.window import note_motion
@@ -172,6 +173,8 @@ class AxialFilter:
             mean = 0.5 * (core["imu"] + self._row)
             if step_s > 0.0:
                 self._inertial(core, mean, dt)
+            if first:
+                core["force"] = self._row[3:]
             if first or dt > 0.0:
                 core["imu"] = self._row
             return step_s
@@ -204,10 +207,11 @@ class AxialFilter:
         strapdown(moved, sample[:3], sample[3:], dt, self.config.gravity_m_s2, self._R, self._F)
         x[QUAT : QUAT + 4] = moved[QUAT : QUAT + 4]
         felt, seen = float(self.held.axis @ moved[VEL : VEL + 3]) / dt, self._tilt_acceleration(x)
+        note_shaking(dt, sample[3:], self._scratch[0]["y"], core, self.settings[0])
         if self._is_ill(core, felt - seen, dt):
             self._predict(core, dt, seen, self.config.axial.thrust_noise)
         else:
-            self._predict(core, dt, felt, self.config.axial.accel_noise)
+            self._predict(core, dt, felt, math.hypot(self.config.axial.accel_noise, math.sqrt(core["jolt"].sum())))
 
     def _is_ill(self, core: Any, difference: float, dt: float) -> bool:
         """Whether the accelerometer contradicts the tilt for longer than drag or a climb could explain."""

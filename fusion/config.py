@@ -76,12 +76,20 @@ class ImuTuning(_Table, frozen=True, kw_only=True):
     Vibration and sampling make the noise in flight larger than at rest: ``accel_noise_scale`` and
     ``gyro_noise_scale`` multiply the sensor's densities, ``accel_walk_scale`` and ``gyro_walk_scale`` the walks of its
     biases.
+
+    Specific force that is farther than ``jolt_m_s2`` from its mean over a tenth of a second is wrong by as much as it
+    is farther, alike over ``jolt_time_s``.  Where it strays by more than ``shaken_m_s2`` as a root mean square over a
+    second, the accelerometer is doubted for a while and its bias may walk: ``shaken_walk`` [s^-3/2] times the stray.
     """
 
     accel_noise_scale: Positive = 2.0
     gyro_noise_scale: Positive = 1.5
     accel_walk_scale: Positive = 1.0
     gyro_walk_scale: Positive = 1.0
+    jolt_m_s2: Positive = 3.0
+    jolt_time_s: NonNegative = 0.15
+    shaken_m_s2: Positive = 1.4
+    shaken_walk: NonNegative = 0.7
 
 
 class StartTuning(_Table, frozen=True, kw_only=True):
@@ -129,9 +137,11 @@ class ImuFault(_Table, frozen=True, kw_only=True):
 class UwbTuning(_Table, frozen=True, kw_only=True):
     """Noise of UWB readings.
 
-    A reading errs by white noise of ``sigma_m`` and by the bias of its path (anchor), of ``bias_sigma_m``, alike over
-    ``bias_time_s`` and over ``bias_length_m`` of way.  Fixes that a receiver computed itself have ``fix_sigma_m`` and
-    ``fix_bias_sigma_m`` per axis: they are as good as its geometry, which we cannot see.
+    A difference errs by white noise of ``sigma_m`` and by the biases of its paths (anchors), of ``bias_sigma_m``, alike
+    over ``bias_time_s`` and over ``bias_length_m`` of way.  Two-way ranges need no common clock: their noise is
+    ``range_sigma_m`` and ``range_bias_sigma_m``, alike over ``range_bias_time_s`` (which counts where there are no
+    differences beside them).  Fixes that a receiver computed itself have ``fix_sigma_m`` and ``fix_bias_sigma_m`` per
+    axis: they are as good as its geometry, which we cannot see.
 
     Where biases are not estimated (0, or more paths than the filter has states), errors of neighbouring readings are
     taken as alike over ``correlation_time_s``: the variance of one that comes every dt is multiplied by
@@ -139,10 +149,13 @@ class UwbTuning(_Table, frozen=True, kw_only=True):
     """
 
     sigma_m: Positive = 0.09
+    range_sigma_m: Positive = 0.05
     fix_sigma_m: Positive = 1.0
     bias_sigma_m: NonNegative = 0.14
+    range_bias_sigma_m: NonNegative = 0.11
     fix_bias_sigma_m: NonNegative = 0.0
     bias_time_s: Positive = 0.6
+    range_bias_time_s: Positive = 0.25
     bias_length_m: Positive = 0.4
     correlation_time_s: NonNegative = 0.014
     nlos_db: float = 6.0

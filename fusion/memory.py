@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError
-from axialnav.models.rig import Imu
+from axialnav.models.rig import Imu, Uwb
 from axialnav.models.state import N_BIASES, N_ERROR, N_NOMINAL
 
 Array = NDArray[np.float64]
@@ -32,6 +32,13 @@ MEMORY: Final = np.dtype(
         ("x", "f8", (2, N_NOMINAL)),
         ("P", "f8", (2, N_ERROR, N_ERROR)),
         ("imu", "f8", 6),  # last sample, body axes: rate, specific force
+        # how it is shaken (kernels.shaking): fading mean of the specific force, mean square beside that of a second and
+        # its highest of late, what they add to the noise of acceleration [m^2/s^3] and bias [m^2/s^5]
+        ("force", "f8", 3),
+        ("shaking", "f8"),
+        ("shaken", "f8"),
+        ("jolt", "f8", 3),
+        ("shaken_walk", "f8"),
         ("t_imu", "i8"),
         ("t_aid", "i8"),  # last axial aid of any kind
         ("t_flow", "i8"),  # last pixel motion
@@ -173,6 +180,7 @@ def new_scratch() -> Records:
 
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
+    "accel_white", "jolt_m_s2", "jolt_time_s", "shaken_m_s2", "shaken_walk",
     "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_time_s", "uwb_bias_length_m",
     "wall_offset_walk", "doubt_m_s2", "doubt_sigmas", "doubt_time_s",
     "trial_s", "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
@@ -197,6 +205,13 @@ def the_imu(config: Config) -> Imu:
     return imus[0]
 
 
+def _bias_time_s(config: Config) -> float:
+    """Over which the biases of UWB paths fade [s]: one time for all of them, that of differences where there are any."""
+    measured = {s.measurement for n, s in config.sensor.items() if isinstance(s, Uwb) and n not in config.disabled}
+    ranges_alone = "range" in measured and "tdoa" not in measured
+    return config.uwb.range_bias_time_s if ranges_alone else config.uwb.bias_time_s
+
+
 def build_settings(config: Config) -> Records:
     """Translate ``config`` into the kernels' numbers, shape (1,); variances are per second unless named otherwise.
 
@@ -217,10 +232,15 @@ def build_settings(config: Config) -> Records:
         "gyro_walk": (imu.gyro_bias_walk * tune.gyro_walk_scale) ** 2,
         "accel_variance": accel,
         "accel_walk": (imu.accel_bias_walk * tune.accel_walk_scale) ** 2,
+        "accel_white": 2.0 * imu.accel_noise_density**2,  # three axes, means of two samples, and a third for luck
+        "jolt_m_s2": tune.jolt_m_s2,
+        "jolt_time_s": tune.jolt_time_s,
+        "shaken_m_s2": tune.shaken_m_s2,
+        "shaken_walk": tune.shaken_walk**2,
         "fault_accel_variance": accel * fault.noise_scale**2,
         "fault_accel_walk": fault.bias_walk**2,
         "blur_scale_walk": config.flow.scale_walk**2,
-        "uwb_bias_time_s": config.uwb.bias_time_s,
+        "uwb_bias_time_s": _bias_time_s(config),
         "uwb_bias_length_m": config.uwb.bias_length_m,
         "wall_offset_walk": config.range.offset_walk_m**2,
         "doubt_m_s2": fault.doubt_m_s2 if fault.enabled else np.inf,

@@ -214,14 +214,18 @@ def counts_as_fewer(spec: AnySensor, config: Config) -> bool:
 def _bias_sigma(spec: AnySensor, config: Config) -> float:
     if not isinstance(spec, Uwb):
         return 0.0
-    return config.uwb.fix_bias_sigma_m if spec.measurement == "position" else config.uwb.bias_sigma_m
+    uwb = config.uwb
+    return {"range": uwb.range_bias_sigma_m, "tdoa": uwb.bias_sigma_m, "position": uwb.fix_bias_sigma_m}[
+        spec.measurement
+    ]
 
 
 def _noise(spec: AnySensor, config: Config) -> tuple[float, Gate]:
     match spec:
         case Uwb(sigma_m=claim, measurement=measurement):
-            floor = config.uwb.fix_sigma_m if measurement == "position" else config.uwb.sigma_m
-            return max(claim or 0.0, floor), config.uwb.gate  # receivers claim too little, never too much
+            uwb = config.uwb
+            floor = {"range": uwb.range_sigma_m, "tdoa": uwb.sigma_m, "position": uwb.fix_sigma_m}[measurement]
+            return max(claim or 0.0, floor), uwb.gate  # receivers claim too little, never too much
         case Flow(sigma_px=sigma, focal_px=focal):
             return sigma or config.flow.sigma_rad * max(focal), config.flow.gate
         case BlurMeter(focal_px=focal) | Camera(focal_px=focal):

@@ -77,7 +77,7 @@ def _judge(a: int, apart: float, moved: float, seen: Record, m: Record, c: Recor
     One that has stepped was excluded at once; it must come closer than others to be taken back, but need not wait.
     """
     stepped = seen.anchor_bad[a] == STEPPED
-    keep = c.fit_m if stepped else CALM * c.anchor_m
+    keep = CALM * (c.fit_m if stepped else c.anchor_m)
     if apart > c.anchor_m or moved > 1.0:
         seen.anchor_bad[a] = max(seen.anchor_bad[a], MOVED)
         seen.bad_block[a] = m.block

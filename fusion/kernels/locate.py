@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.measure import UWB_POSITION, UWB_TDOA
 from axialnav.fusion.kernels.reanchor import solve_symmetric
-from axialnav.fusion.kernels.tracker import path_length, refer
+from axialnav.fusion.kernels.tracker import STEPPED, path_length, refer
 from axialnav.models.jit import Record
 from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_POS, POS
@@ -29,6 +29,7 @@ LEAST_ANCHORS = 3
 INLIER_M = 0.6
 ENOUGH_AGREE = 0.6
 FAR_M = 0.5
+STEPPED_WEIGHT = 0.01  # of a path that has taken a new level: it only settles what the others leave open
 
 
 @kernel
@@ -93,7 +94,7 @@ def _step(t_ns: int, scale: float, s: Record, seen: Record, w: Record) -> bool:
             continue
         r = _residual(a, s, seen, w)
         soft = 1.0 + ((r - w.common) / scale) ** 2
-        weight = 1.0 / (soft * soft)
+        weight = (STEPPED_WEIGHT if seen.anchor_bad[a] == STEPPED else 1.0) / (soft * soft)
         distance = max(path_length(w.fix, s.anchors[a]), 0.05)
         total += weight
         mean_r += weight * r

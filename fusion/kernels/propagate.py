@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import predict_covariance
+from axialnav.fusion.kernels.shaking import note_shaking
 from axialnav.fusion.kernels.window import note_motion
 from axialnav.models.imu import strapdown
 from axialnav.models.jit import Record
@@ -53,7 +54,7 @@ def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: 
     decay = bias_decay(m.x[row], dt, c)
     strapdown(m.x[row], w.mean_imu[0:3], w.mean_imu[3:6], dt, c.gravity_m_s2, w.R, w.F)
     accel = c.fault_accel_variance if fault else c.accel_variance
-    accel_walk = c.fault_accel_walk if fault else c.accel_walk
+    accel_walk = (c.fault_accel_walk if fault else c.accel_walk) + m.shaken_walk
     gyro = c.gyro_variance
     unseen = 0.0
     if dt > MAX_IMU_GAP_S:
@@ -63,7 +64,10 @@ def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: 
         unseen = GAP_ACCEL_VARIANCE * dt * dt * dt / 3.0
     for i in range(3):
         w.Q[E_POS + i] = unseen
-        w.Q[E_VEL + i] = accel * dt
+        jolt = 0.0
+        for k in range(3):
+            jolt += w.R[i, k] * w.R[i, k] * m.jolt[k]
+        w.Q[E_VEL + i] = (accel + jolt) * dt
         w.Q[E_ATT + i] = gyro * dt
         w.Q[E_GYRO_BIAS + i] = c.gyro_walk * dt
         w.Q[E_ACCEL_BIAS + i] = accel_walk * dt
@@ -84,6 +88,8 @@ def propagate(t_ns: int, values: Array, R_BS: Array, m: Record, w: Record, c: Re
     dt = (t_ns - m.t_imu) * 1e-9
     if m.started == 0:
         rotate_sample(values, R_BS, m.imu)
+        for i in range(3):
+            m.force[i] = m.imu[3 + i]
         m.started = 1
         m.t_imu = t_ns
         return 0.0
@@ -94,6 +100,7 @@ def propagate(t_ns: int, values: Array, R_BS: Array, m: Record, w: Record, c: Re
     rotate_sample(values, R_BS, m.imu)
     for i in range(6):
         w.mean_imu[i] = 0.5 * (w.mean_imu[i] + m.imu[i])
+    note_shaking(dt, w.mean_imu[3:6], w.y, m, c)
     for k in range(3):
         w.gained[k] = m.x[0, VEL + k]
     for row in range(1 + m.on_trial):

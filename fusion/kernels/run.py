@@ -14,6 +14,7 @@ from axialnav.fusion.kernels.measure import BLUR, FLOW, HEIGHT
 from axialnav.fusion.kernels.propagate import propagate
 from axialnav.fusion.kernels.rival import supervise_imu
 from axialnav.fusion.kernels.shadow import carry_shadow, note_velocity
+from axialnav.fusion.kernels.shaking import in_doubt
 from axialnav.fusion.kernels.supervise import end_block
 from axialnav.fusion.kernels.update import MIN_WEIGHT, fuse, is_uwb
 from axialnav.fusion.memory import (
@@ -167,7 +168,7 @@ def health(t_ns: int, sources: Records, memory: Records, m: Record, c: Record) -
         flags |= DEAD_RECKONING
     if silent_s > c.invalid_s:
         flags |= VELOCITY_INVALID
-    if m.imu_fault == 1:
+    if in_doubt(m):
         flags |= ACCELEROMETER_FAULT
     if m.resets > 0 and (t_ns - m.t_reset) * 1e-9 < RESET_SHOWN_S:
         flags |= POSITION_RESET

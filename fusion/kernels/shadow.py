@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.kernels.covariance import correct, project
+from axialnav.fusion.kernels.shaking import in_doubt
 from axialnav.models.jit import Integer, Record
 from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_ACCEL_BIAS, E_ATT, E_VEL, N_ERROR, POS, VEL
@@ -58,11 +59,12 @@ def start_shadow(m: Record) -> None:
 @kernel
 def step_shadow(dt: float, v_before: Array, m: Record) -> None:
     """Carry the shadow over an inertial step in which the filter's velocity was ``v_before`` (3,) [m/s]."""
+    jolt = m.jolt[0] + m.jolt[1] + m.jolt[2]
     for i in range(3):
         change = m.x[0, VEL + i] - v_before[i]
         m.shadow_p[i] += dt * (m.shadow_v[i] + 0.5 * change)
         m.shadow_v[i] += change
-        m.shadow_V[i, i] += m.shadow_q * dt
+        m.shadow_V[i, i] += (m.shadow_q + jolt) * dt
         m.flow_k[i] += dt * m.flow_j[i]
 
 
@@ -75,7 +77,7 @@ def draw_shadow(m: Record, w: Record, c: Record) -> None:
     """
     V = m.shadow_V
     m.shadow_q = c.shadow_m_s2 * c.shadow_m_s2 + _acceleration_variance(m, w)
-    if m.imu_fault == 1:
+    if in_doubt(m):
         m.shadow_q += FAULTY_M_S2 * FAULTY_M_S2
     for axis in range(3):
         S = V[axis, axis] + DRAWN_M_S * DRAWN_M_S

@@ -21,6 +21,7 @@ from axialnav.fusion.kernels.locate import ENOUGH_AGREE, locate
 from axialnav.fusion.kernels.measure import BLUR, FLOW, UWB_POSITION
 from axialnav.fusion.kernels.reanchor import FLOW_FRESH_S, move_position
 from axialnav.fusion.kernels.shadow import draw_shadow, recover_velocity
+from axialnav.fusion.kernels.shaking import in_doubt
 from axialnav.fusion.kernels.update import is_uwb
 from axialnav.fusion.memory import BLOCK_S, BLOCKS
 from axialnav.fusion.supervisor import SourceState
@@ -62,7 +63,7 @@ def close_block(t_ns: int, sources: Records, memory: Records, m: Record, w: Reco
         m.ring_j[at, i] = m.flow_j[i]
         m.ring_k[at, i] = m.flow_k[i]
     draw_shadow(m, w, c)
-    aided = (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S and m.imu_fault == 0
+    aided = (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S and not in_doubt(m)
     m.torn = m.torn + 1 if aided and is_torn(t_ns, m, w, c) else 0
     uwb_ok = False
     for i in range(sources.shape[0]):

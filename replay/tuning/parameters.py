@@ -144,7 +144,7 @@ def _noise_name(sensor: str, spec: AnySensor, config: Config) -> str:
     """Setting that decides the noise of a sensor."""
     own = getattr(spec, "sigma_px" if isinstance(spec, Flow) else "sigma_m", None)
     if isinstance(spec, Uwb):
-        general = "uwb.fix_sigma_m" if spec.measurement == "position" else "uwb.sigma_m"
+        general = {"range": "uwb.range_sigma_m", "tdoa": "uwb.sigma_m", "position": "uwb.fix_sigma_m"}[spec.measurement]
         return f"sensor.{sensor}.sigma_m" if (own or 0.0) > read(config, general) else general
     if own is not None:
         return f"sensor.{sensor}.{'sigma_px' if isinstance(spec, Flow) else 'sigma_m'}"

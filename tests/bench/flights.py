@@ -77,7 +77,13 @@ GATED = ("uwb", "flow", "range", "height", "attitude")
 DEFAULT: dict[str, str] = {}
 NO_RIVAL = {"imu_fault.enabled": "false"}
 HARD_GATE = {f"{source}.gate.soft_sigma": NEVER for source in GATED}
-NO_BIASES = {"uwb.bias_sigma_m": "0.0", "uwb.sigma_m": "0.15"}
+NO_BIASES = {
+    "uwb.bias_sigma_m": "0.0",
+    "uwb.range_bias_sigma_m": "0.0",
+    "uwb.sigma_m": "0.15",
+    "uwb.range_sigma_m": "0.15",
+}
+NO_SHAKING = {"imu.jolt_time_s": "0.0", "imu.shaken_walk": "0.0"}
 WHITE_UWB = {**NO_BIASES, "uwb.correlation_time_s": "0.0"}
 NO_REANCHOR = {"supervisor.reanchor_aided_s": NEVER, "supervisor.reanchor_alone_s": NEVER}
 NO_SUPERVISOR = {"supervisor.enabled": "false"}
@@ -90,11 +96,14 @@ PLAIN = {
     **NO_SUPERVISOR,
     **RIGHT_HANDED,
     **{f"{source}.gate.probability": repr(FOUR_SIGMA) for source in GATED},
+    **NO_SHAKING,
     "uwb.sigma_m": "0.2",
+    "uwb.range_sigma_m": "0.2",
 }
 VARIANTS: dict[str, dict[str, str]] = {
     "default": DEFAULT,
     "no rival": NO_RIVAL,
+    "jolts believed": NO_SHAKING,
     "hard gate": HARD_GATE,
     "no bias states": NO_BIASES,
     "white UWB noise": WHITE_UWB,

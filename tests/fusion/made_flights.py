@@ -310,8 +310,16 @@ def textbook(config: Config) -> Config:
     slow = ("height", "attitude")
     return change(
         config,
-        uwb=UwbTuning(bias_sigma_m=0.0, correlation_time_s=0.0, sigma_m=0.01, fix_sigma_m=0.01, gate=wide),
-        imu=ImuTuning(accel_noise_scale=1.0, gyro_noise_scale=1.0),
+        uwb=UwbTuning(
+            bias_sigma_m=0.0,
+            range_bias_sigma_m=0.0,
+            correlation_time_s=0.0,
+            sigma_m=0.01,
+            range_sigma_m=0.01,
+            fix_sigma_m=0.01,
+            gate=wide,
+        ),
+        imu=ImuTuning(accel_noise_scale=1.0, gyro_noise_scale=1.0, jolt_time_s=0.0, shaken_walk=0.0),
         **{name: change(getattr(config, name), gate=wide) for name in ("flow", "range")},
         **{name: change(getattr(config, name), gate=wide, correlation_time_s=0.0) for name in slow},
         imu_fault=change(config.imu_fault, enabled=False),

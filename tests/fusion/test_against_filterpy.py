@@ -27,7 +27,8 @@ def config(measurement: str) -> Config:
         "uwb0": Uwb(measurement=measurement, anchors=dict(ANCHORS), T_BS=transform(lever=LEVER), sigma_m=SIGMA_M),
     }
     gate = Gate(probability=NEVER, soft_sigma=1e9)
-    uwb = UwbTuning(sigma_m=0.01, fix_sigma_m=0.01, bias_sigma_m=0.1, fix_bias_sigma_m=0.1, gate=gate)
+    white, biases = dict.fromkeys(("sigma_m", "range_sigma_m", "fix_sigma_m"), 0.01), ("bias", "range_bias", "fix_bias")
+    uwb = UwbTuning(gate=gate, **white, **{f"{name}_sigma_m": 0.1 for name in biases})
     return Config(sensor=sensors, uwb=uwb)
 
 

@@ -54,7 +54,7 @@ def with_biases(flight: MadeFlight, seed: int) -> MadeFlight:
             bias = keep * bias + np.sqrt(1.0 - keep * keep) * rng.normal(0.0, BIAS_M)
             ranges[row] += bias
     tables = {**flight.tables, "uwb0": Table(table.t_ns, {**table.columns, "range_m": ranges})}
-    told = {"uwb.bias_sigma_m": BIAS_M, "uwb.bias_time_s": BIAS_TIME_S, "uwb.bias_length_m": BIAS_WAY_M}
+    told = {"uwb.range_bias_sigma_m": BIAS_M, "uwb.range_bias_time_s": BIAS_TIME_S, "uwb.bias_length_m": BIAS_WAY_M}
     config = textbook(flight.config).with_params({name: str(value) for name, value in told.items()})
     return MadeFlight(tables, config, flight.truth, flight.gyro_bias, flight.accel_bias)
 

@@ -15,7 +15,9 @@ from tests.fusion.made_flights import ANCHORS, MadeFlight, Scene, Table, fly, st
 # noise told as it is: white UWB, no margin on the inertial unit
 PLAIN = {
     "uwb.sigma_m": "0.01",
+    "uwb.range_sigma_m": "0.01",
     "uwb.bias_sigma_m": "0.0",
+    "uwb.range_bias_sigma_m": "0.0",
     "uwb.correlation_time_s": "0.0",
     "imu.accel_noise_scale": "1.0",
     "imu.gyro_noise_scale": "1.0",
