@@ -206,7 +206,7 @@ def the_imu(config: Config) -> Imu:
 
 
 def _bias_time_s(config: Config) -> float:
-    """Over which the biases of UWB paths fade [s]: one time for all of them, that of differences where there are any."""
+    """Over which the biases of UWB paths fade [s]: one time for all, that of differences where there are any."""
     measured = {s.measurement for n, s in config.sensor.items() if isinstance(s, Uwb) and n not in config.disabled}
     ranges_alone = "range" in measured and "tdoa" not in measured
     return config.uwb.range_bias_time_s if ranges_alone else config.uwb.bias_time_s

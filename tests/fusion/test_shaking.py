@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
+from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -98,10 +99,10 @@ def test_noise_that_the_data_sheet_states_is_no_shaking(density: float) -> None:
     told = msgspec.structs.replace(config.sensor["imu0"], accel_noise_density=density)
     settings = build_settings(msgspec.structs.replace(config, sensor={**config.sensor, "imu0": told}))[0]
     core, dt, scratch = new_memory(1).core[0], 0.005, np.zeros(3)
-    samples = np.random.default_rng(6).normal(0.0, density / np.sqrt(dt), (12_000, 3)) + (0.0, 0.0, 9.81)
+    samples = np.random.default_rng(6).normal(0.0, density / np.sqrt(dt), (12_000, 3)) + np.array([0.0, 0.0, 9.81])
     core["force"] = samples[0]
     shaken_for, jolts = 0, 0.0
-    for before, sample in zip(samples, samples[1:], strict=False):
+    for before, sample in pairwise(samples):
         note_shaking(dt, 0.5 * (before + sample), scratch, core, settings)
         shaken_for += core["shaken_walk"] > 0.0
         jolts += core["jolt"].sum() * dt
