@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.layout import BANDS, RowLayout
 from axialnav.estimators.rows import apply_window, fast_length, hann
-from axialnav.estimators.search import LagTransform, Profiles, search_weight, unrelated_spread
+from axialnav.estimators.search import LagTransform, Profiles, informative, search_spectra, unrelated_spread
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
+from axialnav.estimators.texture import matched_weight
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
@@ -56,10 +59,11 @@ class CoarseSearch:
         """Likelihood of every displacement [px] for the frames in the slots ``order``, oldest first."""
         frames, rows = len(order), self._layout.coarse_count
         power = self._power[order].sum(axis=0).reshape(*rows.shape, -1)
-        weight = self._weight(power.sum(axis=0, dtype=np.float64), rows.sum(axis=0), frames)
+        many = rows.sum(axis=0)
+        mean_power = power.sum(axis=0, dtype=np.float64) / (frames * many[:, None])
+        texture, noise = search_spectra(mean_power, many * frames, self.band)
+        weight = matched_weight(texture, noise, frames)
         spread = unrelated_spread(power, weight, frames, rows)
         slots = np.array(order, dtype=np.int64)
-        return self._lags.profiles(self._pair_re, self._pair_im, slots, weight, grid_px, spread)
-
-    def _weight(self, power: Array, rows: Array, frames: int) -> Array:
-        return search_weight(power / (frames * rows[:, None]), rows * frames, self.band, frames)
+        found = self._lags.profiles(self._pair_re, self._pair_im, slots, weight, grid_px, spread)
+        return replace(found, reach=informative(texture, weight, many, self.band))

@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 from axialnav.estimators.frames import Image
 from axialnav.estimators.positions import centred_times
 from axialnav.estimators.rows import SUMMED_COLUMNS, apply_window, bin_columns, fast_length, hann
-from axialnav.estimators.search import STEP_PX, LagTransform, search_weight, unrelated_spread
+from axialnav.estimators.search import STEP_PX, LagTransform, search_spectra, unrelated_spread
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
+from axialnav.estimators.texture import matched_weight
 
 Plane = NDArray[np.float32]
 COLUMNS = 32
 REACH_PX = 24.0
 MANY_FRAMES = 5
+KEPT_WINDOWS = 30
 TALL_PX = 400  # taller pictures are read every second (third, ...) row: that is sharp enough
 MIN_SIGNIFICANCE = 6.0
 SIGMA_PX = 0.08  # of what is read between two of the asked frames, measured on rendered walls; a pixel pattern is in it
@@ -30,6 +32,31 @@ class Drift:
     cross_px: float
     seen: bool
     sigma_px: float = math.nan
+
+
+class DriftBelief:
+    """Whether the drift that the columns show has proved to be the wall's, for as long as it goes on."""
+
+    def __init__(self) -> None:
+        self.good, self._cross_px, self._left = False, math.inf, 0
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._left = 0
+
+    def holds(self, cross_px: float, jump_px: float) -> bool:
+        """Whether the last answer still holds for this drift [px per frame]; it is the last one seen from now on."""
+        near = self._left > 0 and abs(cross_px - self._cross_px) <= jump_px
+        self._cross_px, self._left = cross_px, self._left - 1 if near else 0
+        return near
+
+    def note(self, cross_px: float) -> None:
+        """Take note of a drift [px per frame] that is too small to be followed."""
+        self._cross_px = cross_px
+
+    def renew(self, good: bool) -> None:
+        """Take note of what the strips say about the last drift seen."""
+        self.good, self._left = good, KEPT_WINDOWS
 
 
 class DriftMeter:
@@ -93,17 +120,15 @@ class DriftMeter:
 
     def _solve(self, squares: Plane, frames: int) -> Drift:
         mean_power, looks = squares.astype(np.float64) / (frames * self._count), np.array([float(self._count * frames)])
-        weight = search_weight(mean_power, looks, self.band, frames)
+        texture, noise = search_spectra(mean_power, looks, self.band)
+        weight = matched_weight(texture, noise, frames)
         spread = unrelated_spread(squares[None], weight, frames, looks[None] / frames)
         order = np.arange(frames)
         found = self._lags.profiles(self._pairs[0], self._pairs[1], order, weight, self._grid, spread)
-        gain, best = found.gain[0], int(np.argmax(found.gain[0]))
-        if best in (0, len(gain) - 1) or found.significance(best, np.ones(1, dtype=np.bool_)) < MIN_SIGNIFICANCE:
+        everyone, best = np.ones(1, dtype=np.bool_), int(np.argmax(found.gain[0]))
+        if best in (0, len(self._grid) - 1) or found.significance(best, everyone) < MIN_SIGNIFICANCE:
             return Drift(0.0, False)
-        left, middle, right = gain[best - 1 : best + 2]
-        bend = 2.0 * middle - left - right
-        shift = 0.5 * (right - left) / bend if bend > 0.0 else 0.0
-        return Drift(self._stride * float(self._grid[best] + STEP_PX * max(-0.5, min(0.5, shift))), True)
+        return Drift(self._stride * found.peak_px(best, everyone), True)
 
 
 def cross_or_nan(drift: Drift) -> tuple[float, float]:

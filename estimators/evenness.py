@@ -14,7 +14,7 @@ from axialnav.estimators.positions import free_positions, motion_basis
 from axialnav.estimators.spectrum import pair_frames
 
 Array = NDArray[np.float64]
-SURE_BEND = 14.0
+SURE_BEND, SHORT_BEND_PX, TELLING_FRAMES = 14.0, 0.15, 5
 CHI2_OFFSET, CHI2_PER_DOF = 16.0, 3.5  # about 1e-5 for one to six degrees of freedom
 UNEVEN_SHARE, UNEVEN_PX = 0.03, 0.02
 MIN_PAIR_SHARE = 0.3
@@ -59,6 +59,17 @@ def bend_significance(fit: Fit) -> float:
     return max(chi2, 0.0) / WINDOW_VARIANCE
 
 
+def short_bend(fit: Fit) -> Array | None:
+    """Where a fit with an acceleration begins, (2,), by the score test's step; None if that is long or proves little.
+
+    With too few frames to tell an acceleration from a missing frame it proves nothing.
+    """
+    frames = fit.score.shape[1]
+    basis = motion_basis(frames, True)
+    bend = float(_chi2(fit, np.ascontiguousarray(basis[:, :1]), np.ascontiguousarray(basis[:, 1:]))[1][0])
+    return np.array([float(fit.motion[0]), bend]) if frames >= TELLING_FRAMES and abs(bend) < SHORT_BEND_PX else None
+
+
 def _chi2(fit: Fit, known: Array, extra: Array) -> tuple[float, Array]:
     step = np.zeros(extra.shape[1])
     return extra_step(fit.score, fit.information, np.ones(len(fit.score)), known, extra, step), step
@@ -88,19 +99,26 @@ def shake_variance(left: Residual, frames: int) -> float:
     return 12.0 * left.rms_px**2 / (frames * (frames**2 - 1)) if left.significant else 0.0
 
 
-def stranger(fit: Fit, rows: Array) -> bool:
+def stranger(fit: Fit, rows: Array, omega: Array) -> bool:
     """Whether a pair of neighbouring frames has almost nothing in common although the others have.
 
-    ``rows`` (c,) are the rows behind the sums of all strips in use.
+    Asked twice: of all detail, and of fine detail, the curvature of the likelihood.  Coarse detail hardly changes over
+    the few pixels by which a frame is off that follows a missing one.  ``rows`` (c,) are the rows behind the sums of
+    all strips in use, ``omega`` (f,) the frequencies [rad/px].
     """
     frames = fit.score.shape[1]
     if frames < 3:
         return False
     pairs = pair_frames(frames)
-    neighbours = fit.coherence.sum(axis=0)[pairs[:, 1] - pairs[:, 0] == 1]
-    usual, least = middle(neighbours), float(neighbours.min())
-    if least >= MIN_PAIR_SHARE * usual:
-        return False
+    i, j = pairs[pairs[:, 1] - pairs[:, 0] == 1].T
     total = fit.texture + fit.noise
-    variance = float(np.sum(rows[:, None] * fit.weight**2 * (total**2 + fit.texture**2)) / 2.0)
-    return bool(usual - least > SURE_PAIR * np.sqrt(WINDOW_VARIANCE * variance))
+    variance = 0.5 * WINDOW_VARIANCE * (rows @ (fit.weight**2 * (total**2 + fit.texture**2)))
+    coarse = fit.coherence.sum(axis=0)[pairs[:, 1] - pairs[:, 0] == 1]
+    fine = -0.5 * fit.information[:, i, j].sum(axis=0)
+    return _alone(coarse, float(variance.sum())) or _alone(fine, float(omega**4 @ variance))
+
+
+def _alone(shared: Array, variance: float) -> bool:
+    """Whether the least of what neighbouring frames share (n - 1,) is far below the usual, beyond noise."""
+    usual, least = middle(shared), float(shared.min())
+    return least < MIN_PAIR_SHARE * usual and usual - least > SURE_PAIR * float(np.sqrt(variance))

@@ -62,11 +62,13 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
     peaks = gain.argmax(axis=1)
     best = gain[np.arange(bands), peaks]
     sure = best > SURE * profiles.spread
-    candidates = {int(np.argmax(gain.sum(axis=0))), *peaks[sure].tolist()}
+    likeliest = int(np.argmax(gain.sum(axis=0)))
     choices = []
-    for candidate in candidates:
+    for candidate in (likeliest, *sorted(set(peaks[sure].tolist()) - {likeliest})):
         near = profiles.near(candidate, REACH_PX)
         opposed = sure & ((best - gain[:, near].max(axis=1)) / SOFTENING > OPPOSED)
+        if candidate == likeliest and not opposed.any():
+            return Choice(likeliest, ~opposed, opposed)  # no other can have fewer opponents or be more likely
         place = near.start + int(np.argmax(gain[~opposed, near].sum(axis=0))) if not opposed.all() else candidate
         likelihood = float(gain[~opposed, place].sum())
         choices.append((int(opposed.sum()), -likelihood, place, opposed))

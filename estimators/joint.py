@@ -30,6 +30,7 @@ from axialnav.estimators.texture import blur_power, matched_weight, sharp_family
 
 Array = NDArray[np.float64]
 LIMITS = np.array([0.3, 1e-4, 4.0])  # longest Newton step and the one that ends the climb [px], number of steps
+MAX_PASSES, SAME_PX = 2, 0.15  # how often weights are computed, and how far no frame may move for them to stay good
 BENDS_PX = 0.125 * np.arange(-16, 17)
 WINDOW_VARIANCE = 1.6
 SHRINKAGE = np.array([6.0, WINDOW_VARIANCE])  # pseudo degrees of freedom, and variance towards which they draw
@@ -86,7 +87,7 @@ def evaluate(products: Products, weight: Array, position_px: Array) -> tuple[Arr
     return score, information, coherence
 
 
-def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: int = 2) -> Fit | None:
+def fit_motion(products: Products, start: Array, exposure_ratio: float, thorough: bool = False) -> Fit | None:
     """Maximise the likelihood of a displacement (and its change, if ``start`` has two numbers).
 
     Parameters
@@ -97,8 +98,8 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
         Displacement per frame [px] (and its change), within half a pixel of the answer, shape (1 or 2,).
     exposure_ratio
         Exposure over frame period; 0 where it is unknown (it only shapes the weights).
-    passes
-        How often the weights are computed anew.
+    thorough
+        Compute the weights anew at the first answer even if it lies so near the start that it will hardly change.
 
     Returns
     -------
@@ -106,24 +107,48 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, passes: 
         None if the likelihood has no maximum there.
     """
     basis = motion_basis(products.frames, len(start) == 2)
-    motion, sums, omega = np.array(start, dtype=np.float64), products.total, products.band.omega()
-    for _ in range(passes):
-        position = basis @ motion - products.offset_px
-        texture, noise, coherent = spectra_at(products, position, exposure_ratio * abs(float(motion[0])))
-        weight = matched_weight(texture, noise, products.frames) * products.independent
-        if not climb(sums.re, sums.im, weight.astype(np.float32), omega, basis, products.offset_px, motion, LIMITS):
+    motion = np.array(start, dtype=np.float64)
+    for _ in range(MAX_PASSES):
+        at = basis @ motion
+        spectra = spectra_at(products, at - products.offset_px, exposure_ratio * abs(float(motion[0])))
+        weight = matched_weight(spectra[0], spectra[1], products.frames) * products.independent
+        if not _climbed(products, weight, basis, motion):
             return None
+        if not thorough and float(np.abs(basis @ motion - at).max()) < SAME_PX:
+            break
+    return _fit_at(products, weight, basis, motion, (spectra[0], spectra[1], weight, spectra[2]))
+
+
+def refit_motion(weighted: Products, start: Array, known: Fit) -> Fit | None:
+    """:func:`fit_motion` with the spectra and weights of a fit to nearly the same products, ``weighted`` by it."""
+    basis, motion = motion_basis(weighted.frames, len(start) == 2), np.array(start, dtype=np.float64)
+    one = np.ones((1, weighted.band.count))
+    if not _climbed(weighted, one, basis, motion):
+        return None
+    return _fit_at(weighted, one, basis, motion, (known.texture, known.noise, known.weight, known.coherent))
+
+
+def _climbed(products: Products, weight: Array, basis: Array, motion: Array) -> bool:
+    """Newton steps on ``motion``, in place; whether the likelihood has a maximum there."""
+    sums, narrow = products.total, weight.astype(np.float32)
+    return climb(sums.re, sums.im, narrow, products.band.omega(), basis, products.offset_px, motion, LIMITS)
+
+
+def _fit_at(
+    products: Products, weight: Array, basis: Array, motion: Array, spectra: tuple[Array, Array, Array, Array]
+) -> Fit | None:
     score, information, coherence = evaluate(products, weight, basis @ motion - products.offset_px)
     covariance = np.empty((len(motion), len(motion)))
     if not parameter_covariance(score, information, basis, SHRINKAGE, covariance):
         return None
-    return Fit(motion, covariance, score, information, coherence, texture, noise, weight, coherent)
+    return Fit(motion, covariance, score, information, coherence, *spectra)
 
 
 def best_bend(products: Products, fit: Fit) -> float:
     """Change of the displacement per frame [px] from a coarse look around a fit without one."""
+    weight = fit.weight if len(fit.weight) == products.re.shape[1] else np.ones((1, products.band.count))
     basis, sums = motion_basis(products.frames, True), products.total
     position = basis[:, 0] * fit.motion[0] + BENDS_PX[:, None] * basis[:, 1] - products.offset_px
     gain = np.empty(len(BENDS_PX))
-    position_gains(sums.re, sums.im, fit.weight.astype(np.float32), products.band.omega(), position, gain)
+    position_gains(sums.re, sums.im, weight.astype(np.float32), products.band.omega(), position, gain)
     return float(BENDS_PX[int(np.argmax(gain))])

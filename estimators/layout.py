@@ -50,6 +50,8 @@ class RowLayout:
         Coefficient rows per strip and class, shape (strips, classes).
     smooth
         First row and one past the last, of every strip's smooth rows, shape (strips, 2).
+    coarse
+        First row and one past the last, of every strip's classes but the finest, shape (strips, 2).
     coarse_rows, coarse_edges, coarse_count
         The rows of the coarse classes, ordered by band and class; the first of every band and class among them, and
         the end; and their numbers, shape (bands, coarse classes).
@@ -80,6 +82,7 @@ class RowLayout:
         ends = self.edges[1:].reshape(STRIPS, self.classes)
         firsts = self.edges[:-1].reshape(STRIPS, self.classes)
         coarse = min(COARSE_CLASSES, max(1, self.levels))
+        self.coarse = np.stack([firsts[:, 0], ends[:, max(0, self.levels - 1)]], axis=1)
         self.smooth = np.stack([firsts[:, 0], ends[:, 0]], axis=1)
         paired = [
             [np.arange(firsts[s, c], ends[s, c]) for s in (2 * band, 2 * band + 1)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,14 @@ from axialnav.estimators.integrity import (
     whiteness,
 )
 from axialnav.estimators.joint import Fit
-from axialnav.estimators.kappa import blur_ratio
+from axialnav.estimators.kappa import UNKNOWN, blur_ratio
 from axialnav.estimators.layout import BANDS, STRIPS
 from axialnav.estimators.products import Products
 from axialnav.estimators.refine import fit_strips, follow
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.search import STEP_PX, Profiles
+from axialnav.estimators.spectrum import LAST_FREQUENCY
+from axialnav.estimators.stretch import stretch_variance
 from axialnav.estimators.window import FrameWindow
 
 Array = NDArray[np.float64]
@@ -39,6 +42,8 @@ MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
 MAX_RIVAL_SHARE = 0.75
 MAX_SIGMA_PX = 0.3
+SURELY_MOVING_PX = 2.0 * STATIC_PX  # slower motion is checked for patterns of the pixels, which are fine
+STRETCH_WINDOWS = 4  # a wall's slant changes slowly
 PRIOR_SIGMAS = 5.0
 PRIOR_MARGIN_PX = 1.0
 
@@ -59,7 +64,7 @@ class JointOptions:
     evenness
         Refuse windows in which a frame was dropped or repeated.
     kappa
-        Refuse two frames whose blur is too short for their displacement.  With more frames the ratio is only reported:
+        Measure blur over displacement; refuse two frames for which it is too short.  With more it is only reported:
         a dropped frame shows in their spacing, and a codec that eats fine detail must not silence the estimate.
     """
 
@@ -83,8 +88,13 @@ def search_grid(width: int, frames: int, prior_px: tuple[float, float] | None) -
     if prior_px is not None:
         margin = PRIOR_SIGMAS * prior_px[1] + PRIOR_MARGIN_PX
         low, high = max(low, prior_px[0] - margin), min(high, prior_px[0] + margin)
-    steps = np.arange(math.floor(low / STEP_PX), math.ceil(high / STEP_PX) + 1)
-    return np.asarray(steps * STEP_PX, dtype=np.float64)
+    return _steps(math.floor(low / STEP_PX), math.ceil(high / STEP_PX))
+
+
+@lru_cache(maxsize=8)
+def _steps(first: int, last: int) -> Array:
+    """Grid of displacements [px], shared: not to be written to."""
+    return np.asarray(np.arange(first, last + 1) * STEP_PX, dtype=np.float64)
 
 
 def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
@@ -106,9 +116,10 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     reason = doubt_search(found, choice, options)
     if reason:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
-    start_px = float(grid[choice.index])
+    start_px = found.peak_px(choice.index, choice.agree)
     strips = np.repeat(choice.agree, STRIPS // BANDS)
-    drift, products = follow(window, start_px, strips, options.exposure_ratio)
+    reach = found.reach if abs(start_px) > SURELY_MOVING_PX else LAST_FREQUENCY
+    drift, products = follow(window, start_px, strips, options.exposure_ratio, reach)
     fit, lost = fit_strips(products, start_px, options.exposure_ratio, options.consensus)
     if lost + int(np.sum(~strips)) > MAX_LOST_STRIPS:
         return refused(MotionReason.BANDS, signed=True, window_s=span_s, method="joint", bands=votes)
@@ -116,13 +127,19 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     reason = doubt_fit(fit, left, products, options)
     if fit is None or left is None or reason:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
-    kappa = blur_ratio(fit, products.band, products.rows.sum(axis=0), options.exposure_ratio)
-    if options.kappa and frames == 2 and kappa.alarming:
+    kappa = UNKNOWN
+    if options.kappa:
+        kappa = blur_ratio(fit, products.band, products.rows.sum(axis=0), options.exposure_ratio)
+    if frames == 2 and kappa.alarming:
         return refused(MotionReason.KAPPA, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
+    if window.stretch.stale():
+        re, im, offset = window.halves(products.band)
+        apart = stretch_variance(re, im, products.band, offset.astype(np.float64), fit)
+        window.stretch.renew(apart, max(frames - 1, STRETCH_WINDOWS))
     cross_px, cross_sigma_px = cross_or_nan(drift)
     return MotionEstimate(
         float(fit.motion[0]),
-        math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames)),
+        math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames) + window.stretch.variance),
         cross_px,
         True,
         MotionReason.GOOD,
@@ -139,7 +156,7 @@ def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, option
     """Why the fit is not believed; "" if it is."""
     if fit is None or left is None:
         return MotionReason.AMBIGUOUS
-    if options.evenness and stranger(fit, products.rows.sum(axis=0)):
+    if options.evenness and stranger(fit, products.rows.sum(axis=0), products.band.omega()):
         return MotionReason.PAIR
     if options.evenness and uneven(fit, left):
         return MotionReason.UNEVEN
@@ -159,9 +176,10 @@ def doubt_search(found: Profiles, choice: Choice, options: JointOptions) -> str:
         return MotionReason.BANDS
     if found.significance(choice.index, choice.agree) < MIN_SIGNIFICANCE:
         return MotionReason.AMBIGUOUS
-    if found.outside_mass(choice.index, choice.agree) > MAX_OUTSIDE_MASS:
+    outside_mass, rival_share = found.rivals(choice.index, choice.agree)
+    if outside_mass > MAX_OUTSIDE_MASS:
         return MotionReason.AMBIGUOUS
-    if found.rival_share(choice.index, choice.agree) > MAX_RIVAL_SHARE:
+    if rival_share > MAX_RIVAL_SHARE:
         return MotionReason.PERIODIC
     if options.prior_px is not None and choice.index in (0, len(found.grid_px) - 1):
         return MotionReason.PRIOR_BORDER

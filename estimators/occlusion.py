@@ -26,7 +26,7 @@ LEAST_SHARE = 0.3
 
 @kernel
 def _cell_powers(
-    planes: Plane, order: Index, shift: Index, edges: Index, wanted: Mask, sums: Plane, out: Array
+    planes: Plane, order: Index, shift: Index, spans: Index, wanted: Mask, sums: Plane, out: Array
 ) -> None:
     """Power in every cell (s, b) of the sum of the shifted frames over the root of their number.
 
@@ -40,8 +40,8 @@ def _cell_powers(
         Slots in use.
     shift
         Shift of each frame [px], around zero.
-    edges
-        First row of every strip and the end, shape (s + 1,).
+    spans
+        First row of every strip and one past its last, shape (s, 2).
     wanted
         Strips to look at, shape (s,).
     sums
@@ -56,11 +56,11 @@ def _cell_powers(
         seen[max(0, -shift[k]) : min(width, width - shift[k])] += np.float32(1.0)
     for c in range(width):
         seen[c] = np.float32(1.0) / max(seen[c], np.float32(1.0))
-    for s in range(edges.shape[0] - 1):
+    for s in range(spans.shape[0]):
         if not wanted[s]:
             continue
         column[:] = np.float32(0.0)
-        for r in range(edges[s], edges[s + 1]):
+        for r in range(spans[s, 0], spans[s, 1]):
             total[:] = np.float32(0.0)
             k = 0
             while k < order.shape[0]:
@@ -112,15 +112,15 @@ class OccluderFinder:
     ----------
     width
         Width of the binned frames.
-    edges
-        First row of every strip and the end, shape (s + 1,).
+    spans
+        Rows of every strip that are looked at: the first and one past the last, shape (s, 2).
     """
 
-    def __init__(self, width: int, edges: Index) -> None:
-        self._edges, self._all = edges, np.ones(len(edges) - 1, dtype=np.bool_)
+    def __init__(self, width: int, spans: Index) -> None:
+        self._spans, self._all = spans, np.ones(len(spans), dtype=np.bool_)
         self._sums = np.zeros((3, width), dtype=np.float32)
-        self._cells = np.zeros((3, len(edges) - 1, width // CELL_PX))
-        self._samples = np.diff(edges)[:, None] * float(CELL_PX)
+        self._cells = np.zeros((3, len(spans), width // CELL_PX))
+        self._samples = np.diff(spans, axis=1) * float(CELL_PX)
 
     def hidden(self, planes: Plane, order: Index, offset: Index) -> Mask:
         """Cells (s, b) in which something stands still before a wall that moves by ``offset`` [px] per frame (n,).
@@ -130,8 +130,8 @@ class OccluderFinder:
         one, still, moving = self._cells
         if int(offset.max() - offset.min()) < LEAST_TRAVEL_PX:
             return np.zeros(still.shape, dtype=np.bool_)
-        _cell_powers(planes, order[:1], 0 * order[:1], self._edges, self._all, self._sums, one)
-        _cell_powers(planes, order, 0 * order, self._edges, self._all, self._sums, still)
+        _cell_powers(planes, order[:1], 0 * order[:1], self._spans, self._all, self._sums, one)
+        _cell_powers(planes, order, 0 * order, self._spans, self._all, self._sums, still)
         usual = float(np.median(one / self._samples)) * self._samples
         sure = SURE * usual * np.sqrt(2.0 / self._samples)
         repeats: Mask = np.asarray(still - usual > sure)
@@ -140,7 +140,7 @@ class OccluderFinder:
             return repeats
         shift = offset - (offset.min() + offset.max()) // 2
         moving[:] = 0.0
-        _cell_powers(planes, order, shift, self._edges, doubtful, self._sums, moving)
+        _cell_powers(planes, order, shift, self._spans, doubtful, self._sums, moving)
         return np.asarray(repeats & (still - moving > sure))
 
 

@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.joint import Fit
-from axialnav.estimators.positions import coherent_power, motion_basis, turns
+from axialnav.estimators.positions import coherent_power, motion_basis, relative_turn, turns
 from axialnav.estimators.products import Products
-from axialnav.estimators.spectrum import pair_count, pair_frames
+from axialnav.estimators.spectrum import pair_count
+from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
 LOWEST_FREQUENCY = 0.15
 SURE = 4.0
 WINDOW_VARIANCE = 1.6
@@ -53,13 +55,34 @@ def pattern_power(products: Products, fit: Fit) -> tuple[float, float]:
 
 def without_pattern(products: Products, power: float) -> Products:
     """The products less a white pattern of this power per row and frame."""
-    pairs, frequency = pair_frames(products.frames), products.band.frequency()
-    shift = products.offset_px[pairs[:, 0]] - products.offset_px[pairs[:, 1]]
-    overlap = np.maximum(0.0, 1.0 - np.abs(shift) / products.window_px)
-    pattern = power * overlap[:, None] * np.exp(2j * np.pi * frequency[None] * shift[:, None])
-    rows = products.rows[:, :, None, None]
-    return replace(
-        products,
-        re=(products.re - rows * pattern.real).astype(np.float32),
-        im=(products.im - rows * pattern.imag).astype(np.float32),
-    )
+    re, im = products.re.copy(), products.im.copy()
+    _take_out(re, im, power * products.rows, products.band.omega(), products.offset_px, float(products.window_px))
+    return replace(products, re=re, im=im)
+
+
+@kernel
+def _take_out(re: Plane, im: Plane, power: Array, omega: Array, offset: Array, window: float) -> None:
+    """Subtract ``power`` (s, c) times the overlap of two windows, turned by their distance, from products (s, c, p, f).
+
+    ``offset`` (n,) [px] says where the windows start, ``window`` [px] how long they are.
+    """
+    frames, count = offset.shape[0], omega.shape[0]
+    cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
+    c, d = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    turns(omega, offset, cosine, sine)
+    p = 0
+    for i in range(frames):
+        for j in range(i + 1, frames):
+            relative_turn(cosine, sine, i, j, c, d)
+            overlap = max(0.0, 1.0 - abs(offset[i] - offset[j]) / window)
+            for s in range(re.shape[0]):
+                for k in range(re.shape[1]):
+                    _subtract(c, np.float32(power[s, k] * overlap), re[s, k, p])
+                    _subtract(d, np.float32(power[s, k] * overlap), im[s, k, p])
+            p += 1
+
+
+@kernel
+def _subtract(line: Plane, factor: np.float32, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] -= line[f] * factor

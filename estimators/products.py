@@ -71,6 +71,14 @@ class Products:
             height=self.height[strips],
         )
 
+    def weighted(self, weight: Array) -> Products:
+        """One class in place of all, their weighted sum; ``weight`` (c, f).  Its own memory, its power is zero."""
+        strips, _, pairs, count = self.re.shape
+        re, im = np.zeros((2, strips, 1, pairs, count), dtype=np.float32)
+        _weigh(self.re, self.im, weight.astype(np.float32), re, im)
+        power, rows = np.zeros((strips, 1, count), dtype=np.float32), self.rows.sum(axis=1, keepdims=True)
+        return replace(self, re=re, im=im, power=power, rows=rows)
+
     @cached_property
     def total(self) -> Sums:
         """The strips summed up."""
@@ -105,3 +113,18 @@ def _sum_strips(re: Plane, im: Plane, power: Plane, out_re: Plane, out_im: Plane
 def _add(line: Plane, total: Plane) -> None:
     for f in range(total.shape[0]):
         total[f] += line[f]
+
+
+@kernel
+def _weigh(re: Plane, im: Plane, weight: Plane, out_re: Plane, out_im: Plane) -> None:
+    for s in range(re.shape[0]):
+        for c in range(re.shape[1]):
+            for p in range(re.shape[2]):
+                _add_weighted(re[s, c, p], weight[c], out_re[s, 0, p])
+                _add_weighted(im[s, c, p], weight[c], out_im[s, 0, p])
+
+
+@kernel
+def _add_weighted(line: Plane, weight: Plane, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] += line[f] * weight[f]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.drift import Drift
-from axialnav.estimators.evenness import SURE_BEND, bend_significance
+from axialnav.estimators.evenness import SURE_BEND, bend_significance, residual, short_bend
 from axialnav.estimators.integrity import MAX_LOST_STRIPS, disturbed, quarrelling
-from axialnav.estimators.joint import Fit, best_bend, fit_motion
+from axialnav.estimators.joint import Fit, best_bend, fit_motion, refit_motion
 from axialnav.estimators.pattern import SURE, pattern_power, without_pattern
 from axialnav.estimators.products import Products
 from axialnav.estimators.roll import roll_step, unrolled
@@ -19,31 +22,49 @@ Mask = NDArray[np.bool_]
 MAX_ROLL_STEPS = 4
 DRIFT_SHARE = 1.0  # of a bin: drift over the whole window that is worth following
 FAST_DRIFT_PX = 12.0  # per frame: faster than anything that flies beside a wall; bins that hide it need no look
+CLEARLY = 1.5  # ratio of two variances that ten strips hardly show by chance
+JUMP_BINS = 2.0  # a drift that changes by more from window to window is asked again
+SLOW_PX = 2.0  # per frame: below, what repeats is weighed anew without the pattern
 UNMOVED = Drift(0.0, False)
 
 
-def follow(window: FrameWindow, start_px: float, strips: Mask, exposure_ratio: float) -> tuple[Drift, Products]:
+def follow(
+    window: FrameWindow, start_px: float, strips: Mask, exposure_ratio: float, reach: float
+) -> tuple[Drift, Products]:
     """Products of some strips from windows that follow the wall, and the drift they follow across the rows.
 
     A drift with which the strips agree less is that of something else (a slanting cable, say) and is not followed.
+    ``reach`` is the highest frequency that tells of the motion [cycles/px].
+
+    Strips are asked when a drift begins, when it jumps, and now and then; in between the window remembers the answer.
     """
+
+    def cut(drift_px: float) -> Products:
+        return window.following(start_px, drift_px, reach).selected(strips)
+
     harmless_px = DRIFT_SHARE * window.bin_height / (len(window.order) - 1)
     drift = UNMOVED
     if harmless_px < FAST_DRIFT_PX:
         drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
-    products = window.following(start_px).selected(strips)
+    belief = window.drift_belief
     if abs(drift.cross_px) < harmless_px:
-        return drift, products
-    still = _spread(products, start_px, exposure_ratio)
-    products = window.following(start_px, drift.cross_px).selected(strips)
-    if _spread(products, start_px, exposure_ratio) < still:
-        return drift, products
-    return UNMOVED, window.following(start_px).selected(strips)
+        belief.note(drift.cross_px)
+        return drift, cut(0.0)
+    if not belief.holds(drift.cross_px, JUMP_BINS * harmless_px):
+        products = cut(0.0)
+        still = _spread(products, start_px, exposure_ratio)
+        products = cut(drift.cross_px)
+        belief.renew(_spread(products, start_px, exposure_ratio) < CLEARLY * still)
+        if belief.good:
+            return drift, products
+    if belief.good:
+        return drift, cut(drift.cross_px)
+    return UNMOVED, cut(0.0)
 
 
 def _spread(products: Products, start_px: float, exposure_ratio: float) -> float:
     """Variance of the displacement [px^2] as the strips show it; infinite if there is no fit."""
-    fit = fit_motion(products, np.array([start_px]), exposure_ratio, passes=1)
+    fit = fit_motion(products, np.array([start_px]), exposure_ratio)
     return float(fit.covariance[0, 0]) if fit is not None else np.inf
 
 
@@ -61,78 +82,105 @@ def fit_strips(products: Products, start_px: float, exposure_ratio: float, conse
     consensus
         Whether strips may be left out.
     """
-    fit = fit_frames(products, np.array([start_px]), exposure_ratio, passes=2)
+    fit = fit_frames(products, np.array([start_px]), exposure_ratio)
     lost = 0
-    for doubt in (_undisturbed, _unrolled) if consensus else ():
-        if fit is None:
-            return fit, lost
-        products, fit, bad = doubt(products, fit, exposure_ratio)
-        lost += int(bad.sum())
-        if fit is None or lost > MAX_LOST_STRIPS:
-            return fit, lost
-        if bad.any():
+    if fit is not None and consensus:
+        bad = disturbed(fit, products)
+        lost = int(bad.sum())
+        if bad.any() and lost <= MAX_LOST_STRIPS:
             products = products.selected(~bad)
             fit = fit_frames(products, fit.motion, exposure_ratio)
-    products, fit = _level(products, fit, exposure_ratio)
-    products, fit = _unpatterned(products, fit, exposure_ratio)
-    bad = quarrelling(fit, products) if fit is not None and consensus else np.zeros(0, dtype=np.bool_)
-    lost += int(bad.sum())
-    if fit is None or not bad.any() or lost > MAX_LOST_STRIPS:
+    if fit is None or lost > MAX_LOST_STRIPS:
         return fit, lost
-    return fit_frames(products.selected(~bad), fit.motion, exposure_ratio), lost
-
-
-def _undisturbed(products: Products, fit: Fit, exposure_ratio: float) -> tuple[Products, Fit | None, Mask]:
-    """Products and fit as they are, and the strips that something fixed to the camera disturbs."""
-    return products, fit, disturbed(fit, products)
-
-
-def _unrolled(products: Products, fit: Fit, exposure_ratio: float) -> tuple[Products, Fit | None, Mask]:
-    """Strips that quarrel with the others; if a roll explains them, none, and products and fit without it."""
-    bad = quarrelling(fit, products)
-    if not bad.any() or roll_step(fit, products.height) is None:
-        return products, fit, bad
-    levelled, level = _level(products, fit, exposure_ratio)
-    explained = level is not None and not quarrelling(level, levelled).any()
-    if explained or int(bad.sum()) > MAX_LOST_STRIPS:
-        return levelled, level, np.zeros_like(bad)
-    return products, fit, bad
-
-
-def _level(products: Products, fit: Fit | None, exposure_ratio: float) -> tuple[Products, Fit | None]:
-    """Take out the camera's roll as long as it shows."""
-    for _ in range(MAX_ROLL_STEPS):
-        shift = roll_step(fit, products.height) if fit is not None else None
-        if fit is None or shift is None:
-            break
-        products = unrolled(products, shift)
-        fit = fit_frames(products, fit.motion, exposure_ratio)
-    return products, fit
-
-
-def _unpatterned(products: Products, fit: Fit | None, exposure_ratio: float) -> tuple[Products, Fit | None]:
-    """Take out a white pattern of the pixels if there is one."""
-    if fit is None:
-        return products, fit
     power, sigma = pattern_power(products, fit)
     if power <= SURE * sigma:
-        return products, fit
-    products = without_pattern(products, power)
-    return products, fit_frames(products, fit.motion, exposure_ratio)
+        if roll_step(fit, products.height) is None and not (consensus and quarrelling(fit, products).any()):
+            return fit, lost
+        level, quarrels = _levelled(products.weighted(fit.weight), fit, consensus)
+        return level, lost + quarrels
+    products, start = without_pattern(products, power), fit.motion
+    if abs(float(start[0])) < SLOW_PX:
+        fit = fit_frames(products, start, exposure_ratio)
+        if fit is None:
+            return None, lost
+    weighted = products.weighted(fit.weight)
+    clean = refit_frames(weighted, start, fit)
+    if clean is None:
+        return None, lost
+    level, quarrels = _levelled(weighted, clean, consensus)
+    return level, lost + quarrels
 
 
-def fit_frames(products: Products, start: Array, exposure_ratio: float, passes: int = 1) -> Fit | None:
+def _levelled(weighted: Products, fit: Fit, consensus: bool) -> tuple[Fit | None, int]:
+    """The fit without the camera's roll and without strips that quarrel, and the number of these.
+
+    Strips that quarrel with the others stay if a roll explains them.
+    """
+    bad = quarrelling(fit, weighted)
+    lost = 0
+    if consensus and bad.any():
+        products, level = _unrolled(weighted, fit)
+        lost = int(bad.sum())
+        if products is not weighted and level is not None:
+            lost = 0 if lost > MAX_LOST_STRIPS or not quarrelling(level, products).any() else lost
+        if lost:
+            if lost > MAX_LOST_STRIPS:
+                return level, lost
+            products = weighted.selected(~bad)
+            again = refit_frames(products, fit.motion, fit)
+            if again is None:
+                return None, lost
+            products, level = _unrolled(products, again)
+    else:
+        products, level = _unrolled(weighted, fit)
+    if level is None or not consensus:
+        return level, lost
+    bad = quarrelling(level, products)
+    lost += int(bad.sum())
+    if not bad.any() or lost > MAX_LOST_STRIPS:
+        return level, lost
+    return refit_frames(products.selected(~bad), level.motion, level), lost
+
+
+def _unrolled(weighted: Products, fit: Fit) -> tuple[Products, Fit | None]:
+    """Products and fit without the camera's roll, taken out as long as it shows; the same ones if it never does."""
+    products, level = weighted, fit
+    for _ in range(MAX_ROLL_STEPS):
+        shift = roll_step(level, products.height)
+        if shift is None:
+            break
+        products = unrolled(products, shift)
+        again = refit_frames(products, level.motion, level)
+        if again is None:
+            return products, None
+        level = again
+    return products, level
+
+
+def fit_frames(products: Products, start: Array, exposure_ratio: float) -> Fit | None:
     """Displacement alone, or with an acceleration if that is significant.
 
     ``start`` is that of :func:`~axialnav.estimators.joint.fit_motion`; an acceleration in it was significant in a fit
     to nearly the same products, and is fitted at once.
     """
+    return _with_bend(products, start, partial(fit_motion, products, exposure_ratio=exposure_ratio))
+
+
+def refit_frames(weighted: Products, start: Array, known: Fit) -> Fit | None:
+    """:func:`fit_frames` with the spectra and weights of a fit to nearly the same products, ``weighted`` by it."""
+    return _with_bend(weighted, start, lambda motion, thorough=False: refit_motion(weighted, motion, known))
+
+
+def _with_bend(products: Products, start: Array, solve: Callable[..., Fit | None]) -> Fit | None:
     if len(start) == 2:
-        fit = fit_motion(products, start, exposure_ratio, passes)
+        fit = solve(start)
         if fit is not None and bend_significance(fit) >= SURE_BEND:
             return fit
-    fit = fit_motion(products, start[:1], exposure_ratio, passes)
+    fit = solve(start[:1])
     if fit is None or bend_significance(fit) < SURE_BEND:
         return fit
-    bent = np.array([float(fit.motion[0]), best_bend(products, fit)])
-    return fit_motion(products, bent, exposure_ratio) or fit
+    short = short_bend(fit)
+    bent = solve(short) if short is not None else None
+    if bent is None or residual(bent).significant:  # a missing frame looks like any bend, and best like a strong one
+        bent = solve(np.array([float(fit.motion[0]), best_bend(products, fit)]), thorough=True)
+    return bent or fit

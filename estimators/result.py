@@ -51,8 +51,8 @@ class MotionEstimate:
     window_s
         Time over which the displacement is a mean [s]; its middle is the time the estimate belongs to.
     kappa
-        Blur length over the one expected from the displacement [-]; NaN where it was not measured. 1 is healthy, 0.5
-        says that a frame was dropped.
+        Blur length over the one expected from the displacement [-]; NaN where it was not measured (a stream of three
+        or more frames measures it once per N - 1 windows). 1 is healthy, 0.5 says that a frame was dropped.
     acceleration_px
         Change of the displacement per frame period [px]; 0 where it was not significant.
     method

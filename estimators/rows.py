@@ -7,6 +7,7 @@ motion is along the rows.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -105,8 +106,9 @@ def _multiply(line: Plane, window: Plane, out: Plane) -> None:
         out[c] = line[c] * window[c]
 
 
+@lru_cache(maxsize=64)
 def tukey(length: int, share: float = 0.1) -> Plane:
-    """Window (length,) with cosine flanks over ``share`` of it."""
+    """Window (length,) with cosine flanks over ``share`` of it, shared: not to be written to."""
     flank = int(share * (length - 1) / 2)
     window = np.ones(length, dtype=np.float32)
     rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(flank + 1) / flank))

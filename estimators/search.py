@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.spectrum import Band
-from axialnav.estimators.texture import matched_weight, sharp_family, texture_power
+from axialnav.estimators.spectrum import LAST_FREQUENCY, Band
+from axialnav.estimators.texture import sharp_family, texture_power
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
@@ -20,6 +20,8 @@ NEAR_PX = 1.0
 RIVAL_PX = 8.0
 TINY = 1e-12
 NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold mostly noise
+ENOUGH_INFORMATION, REACH_MARGIN, REACH_STEP = 0.98, 1.25, LAST_FREQUENCY / 12
+LEAST_REACH = 0.5 * LAST_FREQUENCY  # noise and patterns of the pixels are seen above the texture
 HANN_VARIANCE = 1.94  # of a sum over neighbouring bins, which a Hann window makes dependent
 
 
@@ -35,11 +37,14 @@ class Profiles:
         Log-likelihood of every band, shape (b, d); differences matter.
     spread
         Standard deviation that ``gain`` would have if the frames had nothing in common, shape (b,).
+    reach
+        Frequency beyond which hardly anything tells of the motion [cycles/px].
     """
 
     grid_px: Array
     gain: Array
     spread: Array
+    reach: float = LAST_FREQUENCY
 
     def total(self, bands: NDArray[np.bool_]) -> Array:
         """Sum over some bands, shape (d,)."""
@@ -50,24 +55,32 @@ class Profiles:
         steps = int(reach_px / (self.grid_px[1] - self.grid_px[0]) + 1e-9)
         return slice(max(0, index - steps), index + steps + 1)
 
+    def peak_px(self, index: int, bands: NDArray[np.bool_]) -> float:
+        """Displacement at the top of a parabola through the total at a grid point and its neighbours."""
+        if not 0 < index < len(self.grid_px) - 1:
+            return float(self.grid_px[index])
+        left, middle, right = (float(gain) for gain in bands.astype(np.float64) @ self.gain[:, index - 1 : index + 2])
+        bend = 2.0 * middle - left - right
+        shift = 0.5 * (right - left) / bend if bend > 0.0 else 0.0
+        return float(self.grid_px[index]) + STEP_PX * max(-0.5, min(0.5, shift))
+
     def significance(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Height of the total at a grid point in standard deviations of unrelated frames."""
         return float(self.gain[bands, index].sum() / np.sqrt(np.sum(self.spread[bands] ** 2)))
 
-    def outside_mass(self, index: int, bands: NDArray[np.bool_]) -> float:
-        """Posterior mass further than 1 px from a grid point, under the softened likelihood."""
+    def rivals(self, index: int, bands: NDArray[np.bool_]) -> tuple[float, float]:
+        """What speaks for displacements other than that of a grid point.
+
+        Posterior mass further than 1 px from it under the softened likelihood, and the highest total further than 8 px
+        away over the total there [-].
+        """
         total = self.total(bands)
         mass = np.exp(np.minimum((total - total[index]) / SOFTENING, 50.0))
+        near, apart = self.near(index, NEAR_PX), self.near(index, RIVAL_PX)
         whole = float(mass.sum())
-        mass[self.near(index, NEAR_PX)] = 0.0
-        return float(mass.sum()) / whole
-
-    def rival_share(self, index: int, bands: NDArray[np.bool_]) -> float:
-        """Highest total elsewhere (further than 8 px) over the total at a grid point [-]."""
-        total = self.total(bands)
-        near = self.near(index, RIVAL_PX)
-        far = [float(part.max()) for part in (total[: near.start], total[near.stop :]) if len(part)]
-        return max(far) / float(total[index]) if far and total[index] > 0.0 else 0.0
+        far = [float(part.max()) for part in (total[: apart.start], total[apart.stop :]) if len(part)]
+        share = max(far) / float(total[index]) if far and total[index] > 0.0 else 0.0
+        return (whole - float(mass[near].sum())) / whole, share
 
 
 class LagTransform:
@@ -191,12 +204,27 @@ def unrelated_spread(power: Plane, weight: Array, frames: int, rows: Array) -> A
     return np.asarray(np.sqrt(2.0 * HANN_VARIANCE * pairs * variance))
 
 
-def search_weight(power: Array, looks: Array, band: Band, frames: int) -> Array:
-    """Matched weights from the mean power (c, f) of ``looks`` (c,) rows; white noise, read off the finest class."""
+def search_spectra(power: Array, looks: Array, band: Band) -> tuple[Array, Array]:
+    """Texture (c, f) and noise (f,) from the mean power (c, f) of ``looks`` (c,) rows.
+
+    The noise is white, and read off the finest class.
+    """
     tail = int(NOISE_SHARE * band.count)
     noise = np.full(band.count, float(power[-1, tail:].mean()) + TINY)
     shapes, family, starts = sharp_family(band.first, band.count, band.length)
     texture = np.empty_like(power)
     for c in range(len(power)):
         texture_power(power[c], noise, float(looks[c]), shapes, family, starts, texture[c])
-    return matched_weight(texture, noise, frames)
+    return texture, noise
+
+
+def informative(texture: Array, weight: Array, rows: Array, band: Band) -> float:
+    """Frequency [cycles/px] beyond which hardly anything tells of the motion, in steps of a twelfth of the band.
+
+    What the search's rows say, with a margin, for finer rows hold finer detail. ``texture`` and ``weight`` (c, f),
+    ``rows`` (c,).
+    """
+    information = np.cumsum(rows @ (weight * texture) * band.omega() ** 2)
+    last = int(np.searchsorted(information, ENOUGH_INFORMATION * information[-1])) + band.first
+    steps = np.ceil(REACH_MARGIN * last / band.length / REACH_STEP)
+    return float(min(max(steps * REACH_STEP, LEAST_REACH), LAST_FREQUENCY))

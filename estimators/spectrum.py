@@ -20,6 +20,7 @@ from axialnav.models.jit import kernel
 Plane = NDArray[np.float32]
 Array = NDArray[np.float64]
 FIRST_BIN = 4  # below: lamps and vignettes
+LEAST_BINS = 4
 LAST_FREQUENCY = 0.48  # cycles per pixel; above: aliasing
 
 
@@ -31,9 +32,12 @@ class Band:
     ----------
     length
         Window length [px].
+    reach
+        Frequencies end here [cycles/px].
     """
 
     length: int
+    reach: float = LAST_FREQUENCY
 
     @property
     def first(self) -> int:
@@ -43,7 +47,7 @@ class Band:
     @property
     def last(self) -> int:
         """One past the last bin."""
-        return max(FIRST_BIN + 4, int(self.length * LAST_FREQUENCY))
+        return max(FIRST_BIN + LEAST_BINS, int(self.length * self.reach))
 
     @property
     def count(self) -> int:

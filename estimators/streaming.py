@@ -75,6 +75,7 @@ class MotionEstimator:
         self._reasons: deque[str] = deque(maxlen=frames)
         self._period_ns = 1e9 / camera.rate_hz if camera is not None and camera.rate_hz else math.inf
         self._note = ""
+        self._windows = 0
 
     def push(
         self,
@@ -175,4 +176,6 @@ class MotionEstimator:
         if reason:
             return refused(reason, signed=True, window_s=span / 1e9, method="joint")
         assert self._window is not None
-        return measure_joint(self._window, JointOptions(period_s, exposure_s, prior_px))
+        self._windows += 1
+        kappa = self._windows % (self._frames - 1) == 0  # windows in between show the same blur once more
+        return measure_joint(self._window, JointOptions(period_s, exposure_s, prior_px, kappa=kappa))

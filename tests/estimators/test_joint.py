@@ -74,7 +74,7 @@ def test_an_acceleration_known_from_before_is_kept_or_given_up_as_the_frames_say
         for frame in picture.frames:
             window.push(frame)
         products = window.following(9.0)
-        cold, warm = (fit_frames(products, np.array(start), 0.3, 2) for start in ([9.0], [9.0, 0.9]))
+        cold, warm = (fit_frames(products, np.array(start), 0.3) for start in ([9.0], [9.0, 0.9]))
         assert cold is not None
         assert warm is not None
         np.testing.assert_allclose(warm.motion, cold.motion, atol=0.3 * np.sqrt(cold.covariance[0, 0]))

@@ -328,7 +328,7 @@ def test_an_object_that_stands_still_is_found_where_it_is() -> None:
     wall = rng.normal(size=(40, 300)).astype(np.float32)
     planes = np.stack([wall[:, 3 * k : 3 * k + 256] for k in range(4)]) + rng.normal(size=(4, 40, 256))
     planes[:, 8:12, 64:96] += 9.0 * np.sign(rng.normal(size=(4, 32)))
-    finder = OccluderFinder(256, np.arange(0, 41, 4))
+    finder = OccluderFinder(256, np.stack([np.arange(0, 40, 4), np.arange(4, 41, 4)], axis=1))
     hidden = finder.hidden(planes.astype(np.float32), np.arange(4), -3 * np.arange(4))
     assert np.argwhere(hidden).tolist() == [[2, 4], [2, 5]]
     assert not finder.hidden(planes.astype(np.float32), np.arange(4), np.zeros(4, dtype=np.int64)).any()
