@@ -46,6 +46,7 @@ from axialnav.fusion.memory import (
     build_settings,
     new_memory,
     new_scratch,
+    whole_covariance,
 )
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind, build_sources
@@ -196,6 +197,7 @@ class AxialFilter:
         if dt > 0.0:
             resets = int(core["resets"])
             end_block(t_ns, self.sources, memory.sources, core, w, self.settings[0])
+            core["P"][0] = whole_covariance(core["P"][0])
             if core["resets"] > resets:
                 self._part_position(core)
 

@@ -17,7 +17,7 @@ from axialnav.fusion.events import Events, half_window_ns, late_ns
 from axialnav.fusion.kernels.propagate import propagate_filter
 from axialnav.fusion.kernels.run import health
 from axialnav.fusion.kernels.update import MIN_WEIGHT
-from axialnav.fusion.memory import LOG_WIDTH, Memory, build_settings, new_memory, new_scratch
+from axialnav.fusion.memory import LOG_WIDTH, Memory, build_settings, new_memory, new_scratch, whole_covariance
 from axialnav.fusion.outcome import AxialState, Health, Outcome, Reason, Verdict, verdict_of
 from axialnav.fusion.packing import Packer
 from axialnav.fusion.readings import BlurLength, CameraFrame, ImuSample, PixelMotion, Reading
@@ -204,7 +204,7 @@ class CorridorEstimator:
         return Outcome(reading.t_ns, reading.sensor, verdict, reason, innovation, variance, nis, gate, weight)
 
     def _axial_state(self, t_ns: int, memory: Memory, flags: Health) -> AxialState:
-        x, P = memory.core["x"][0, 0], memory.core["P"][0, 0]
+        x, P = memory.core["x"][0, 0], whole_covariance(memory.core["P"][0, 0])
         axis = np.array(self.config.axis)
         position, velocity = x[POS : POS + 3].copy(), x[VEL : VEL + 3].copy()
         position_P, velocity_P = P[E_POS : E_POS + 3, E_POS : E_POS + 3], P[E_VEL : E_VEL + 3, E_VEL : E_VEL + 3]
@@ -222,7 +222,7 @@ class CorridorEstimator:
             blur_scale=float(x[BLUR_SCALE]),
             uwb_bias_m=x[UWB_BIAS:].copy(),
             wall_offset_m=float(x[WALL_OFFSET]),
-            covariance=P.copy(),
+            covariance=P,
             flags=flags,
             resets=int(memory.core["resets"][0]),
             last_reset_delta_m=memory.core["last_reset_m"][0].copy(),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.config import Config
 from axialnav.fusion.errors import ConfigError
 from axialnav.models.rig import Imu, Uwb
-from axialnav.models.state import N_BIASES, N_ERROR, N_NOMINAL
+from axialnav.models.state import N_BIASES, N_CORE, N_ERROR, N_NOMINAL
 
 Array = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -30,7 +30,7 @@ MEMORY: Final = np.dtype(
     [
         # row 0 is the estimate, row 1 the rival that runs while the accelerometer is in doubt
         ("x", "f8", (2, N_NOMINAL)),
-        ("P", "f8", (2, N_ERROR, N_ERROR)),
+        ("P", "f8", (2, N_ERROR, N_ERROR)),  # without the block below the core: see whole_covariance
         ("imu", "f8", 6),  # last sample, body axes: rate, specific force
         # how it is shaken (kernels.shaking): fading mean of the specific force, mean square beside that of a second and
         # its highest of late, what they add to the noise of acceleration [m^2/s^3] and bias [m^2/s^5]
@@ -49,7 +49,7 @@ MEMORY: Final = np.dtype(
         ("imu_fault", "i8"),
         ("on_trial", "i8"),
         ("t_trial", "i8"),
-        ("t_failed", "i8"),  # end of the last trial of a healthy rival that spoke clearly against it
+        ("t_failed", "i8"),  # end of the last trial that did not speak for the rival
         ("good_trials", "i8"),
         ("evidence", "f8"),  # log-likelihood of the rival minus that of the estimate
         # integrals of rate and acceleration since the start, and their values at instants of the past
@@ -171,6 +171,13 @@ def new_memory(n_sources: int) -> Memory:
     for stamp in ("t_failed", "t_shadow", "t_motion_blamed", "t_neither"):
         core[stamp] = LONG_AGO
     return Memory(core, sources)
+
+
+def whole_covariance(P: Array) -> Array:
+    """Copy of a covariance (25, 25) out of the memory, with the block below its core that kernels leave alone."""
+    whole = P.copy()
+    whole[N_CORE:, :N_CORE] = P[:N_CORE, N_CORE:].T
+    return whole
 
 
 def new_scratch() -> Records:

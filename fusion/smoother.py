@@ -22,7 +22,15 @@ from axialnav.fusion.events import Events, Table, pack_tables
 from axialnav.fusion.handedness import mirror_config, mirror_tables, mirror_track
 from axialnav.fusion.kernels.record import advance, record
 from axialnav.fusion.kernels.smooth import STEP, WORK, smooth_back
-from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, Memory, build_settings, new_memory, new_scratch
+from axialnav.fusion.memory import (
+    LOG_WIDTH,
+    TRACK_WIDTH,
+    Memory,
+    build_settings,
+    new_memory,
+    new_scratch,
+    whole_covariance,
+)
 from axialnav.fusion.outcome import Track
 from axialnav.fusion.sources import Kind, Records, build_sources
 from axialnav.models.state import N_BIASES
@@ -113,7 +121,7 @@ class Pass:
         one_row, one_log, imu = np.zeros((1, TRACK_WIDTH)), np.zeros((1, LOG_WIDTH)), np.zeros(6)
         paths = np.zeros(N_BIASES, np.int64)
         last = self.cuts[-1][2].core
-        work["x"][0], work["P"][0] = last["x"][0, 0], last["P"][0, 0]
+        work["x"][0], work["P"][0] = last["x"][0, 0], whole_covariance(last["P"][0, 0])
         spent, self.steps = 0.0, 0
         for (start, row, memory), (stop, _, _) in zip(self.cuts[-2::-1], self.cuts[:0:-1], strict=True):
             began = time.perf_counter()

@@ -31,23 +31,32 @@ def threaded_kernel(function: F) -> F:
     return _compiled(function, nogil=True)
 
 
-def _compiled(function: F, *, nogil: bool) -> F:
+def apart_kernel(function: F) -> F:
+    """As :func:`kernel`, for a function whose arrays never overlap: that is what vector instructions need to know."""
+    return _compiled(function, nogil=False, apart=True)
+
+
+def _compiled(function: F, *, nogil: bool, apart: bool = False) -> F:
     known = TRIED[0] <= numba.version_info.short <= TRIED[1]
-    compiled: Any = _in_one_module(function, nogil) if known else numba.njit(nogil=nogil, **OPTIONS)(function)
+    compiled: Any = _in_one_module(function, nogil, apart) if known else numba.njit(nogil=nogil, **OPTIONS)(function)
     cache_with_stamp(compiled)
     result: F = compiled
     return result
 
 
-def _in_one_module(function: F, nogil: bool) -> Any:
-    from axialnav.models.one_module import PartCacheImpl, PartCompiler, WholeCompiler
+def _in_one_module(function: F, nogil: bool, apart: bool) -> Any:
+    from axialnav.models.one_module import ApartCompiler, PartCacheImpl, PartCompiler, WholeCompiler
 
     # nothing is allocated, so nothing has to be counted
     whole: Any = numba.njit(nogil=nogil, _nrt=False, pipeline_class=WholeCompiler, **OPTIONS)(function)
     if whole is function:  # NUMBA_DISABLE_JIT=1
         return whole
     part: Any = numba.njit(
-        _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=PartCompiler, **OPTIONS
+        _nrt=False,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        pipeline_class=ApartCompiler if apart else PartCompiler,
+        **OPTIONS,
     )(function)
     part._cache._impl = PartCacheImpl(function)
     cache_with_stamp(part, ".part")

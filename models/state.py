@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 N_BIASES: Final = 8  # UWB paths whose slow error is estimated at a time
 N_NOMINAL: Final = 18 + N_BIASES
 N_ERROR: Final = 17 + N_BIASES
+N_CORE: Final = 9  # position, velocity and attitude, which the others feed
 
 POS, VEL, QUAT, GYRO_BIAS, ACCEL_BIAS, BLUR_SCALE, WALL_OFFSET, UWB_BIAS = 0, 3, 6, 10, 13, 16, 17, 18
 E_POS, E_VEL, E_ATT, E_GYRO_BIAS, E_ACCEL_BIAS, E_BLUR_SCALE, E_WALL_OFFSET, E_UWB_BIAS = 0, 3, 6, 9, 12, 15, 16, 17

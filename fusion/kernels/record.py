@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.fusion.kernels.covariance import complete
 from axialnav.fusion.kernels.paths import forget_bias
 from axialnav.fusion.kernels.propagate import bias_decay
 from axialnav.fusion.kernels.rival import copy_filter
@@ -66,7 +67,7 @@ def record(
         for k in range(N_BIASES):
             paths[k] = m.path[k]
         for row in range(pair):
-            copy_filter(m.x[row], m.P[row], s.x_before[row], s.P_before[row])
+            _keep(m.x[row], m.P[row], s.x_before[row], s.P_before[row])
         one = slice(e, e + 1)
         run(t_ns[one], source[one], values[one], sources, core, memory, scratch, settings, track, log)
         new = new_paths(paths, m.path, s.new)
@@ -85,7 +86,7 @@ def record(
             if s.kind == NEW_PATHS:
                 _before_the_update(row, s, m)
                 continue
-            copy_filter(m.x[row], m.P[row], s.x_after[row], s.P_after[row])
+            _keep(m.x[row], m.P[row], s.x_after[row], s.P_after[row])
             if s.kind == INERTIAL:
                 _transition(s, row, imu, m, w, c)
         s.chosen = 0
@@ -96,6 +97,13 @@ def record(
         if m.on_trial == 1 and s.kind == INERTIAL and m.t_trial == m.t_imu:
             trial_from = n
     return n
+
+
+@kernel
+def _keep(x: Array, P: Array, to_x: Array, to_P: Array) -> None:
+    """Copy a filter with the whole of its covariance."""
+    copy_filter(x, P, to_x, to_P)
+    complete(to_P)
 
 
 @kernel

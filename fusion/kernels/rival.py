@@ -2,7 +2,8 @@
 
 Healthy and faulty differ in the noise given to the accelerometer.  The rival starts as a copy of the estimate and sees
 the same readings; the difference of log-likelihoods, counted once per independent reading, decides (a sequential
-probability ratio test).  Running it only in doubt costs nothing on a healthy flight.
+probability ratio test).  Running it only in doubt costs nothing on a healthy flight, and a trial that does not speak
+for the rival is followed by a rest, so that doubt without reason costs half.
 
 Source: Bar-Shalom, Li, Kirubarajan (2001), section 11.6.2 (static multiple models); Wald (1945).
 """
@@ -53,7 +54,7 @@ def supervise_imu(dt: float, m: Record, c: Record) -> None:
         _judge(fault, (m.t_imu - m.t_trial) * 1e-9 > c.trial_s, m, c)
         fault = m.imu_fault == 1
     rested = (m.t_imu - m.t_failed) * 1e-9 > c.trial_s
-    if m.on_trial == 0 and ((fault and rested) or (doubtful and not fault)):
+    if m.on_trial == 0 and rested and (fault or doubtful):
         m.on_trial = 1
         m.t_trial = m.t_imu
         m.evidence = 0.0
@@ -62,21 +63,31 @@ def supervise_imu(dt: float, m: Record, c: Record) -> None:
 
 @kernel
 def _judge(fault: bool, over: bool, m: Record, c: Record) -> None:
+    """End the trial, or let it go on; one that does not speak for the rival is followed by a rest of that length."""
     evidence = m.evidence
     if fault:
         if evidence < -c.evidence:
-            m.on_trial = 0
-            m.good_trials = 0
-            m.t_failed = m.t_imu
+            _fail(m)
         elif over:
             m.on_trial = 0
-            m.good_trials = m.good_trials + 1 if evidence >= -c.evidence_to_clear else 0
-            if m.good_trials >= c.trials_to_clear:
+            m.good_trials += 1
+            if evidence < -c.evidence_to_clear:
+                _fail(m)
+            elif m.good_trials >= c.trials_to_clear:
                 _take_over(m)
     elif evidence > c.evidence:
         _take_over(m)
     elif over or evidence < -GIVE_UP:
         m.on_trial = 0
+        if evidence < c.evidence_to_clear:
+            _fail(m)
+
+
+@kernel
+def _fail(m: Record) -> None:
+    m.on_trial = 0
+    m.good_trials = 0
+    m.t_failed = m.t_imu
 
 
 @kernel

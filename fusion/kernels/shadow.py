@@ -104,7 +104,7 @@ def _acceleration_variance(m: Record, w: Record) -> float:
             for k in range(6):
                 row = E_ATT + j if j < 3 else E_ACCEL_BIAS + j - 3
                 column = E_ATT + k if k < 3 else E_ACCEL_BIAS + k - 3
-                variance += w.ray[j] * P[row, column] * w.ray[k]
+                variance += w.ray[j] * P[min(row, column), max(row, column)] * w.ray[k]
         worst = max(worst, variance)
     return float(worst)
 

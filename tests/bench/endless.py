@@ -15,7 +15,7 @@ from axialnav.fusion.alignment import align
 from axialnav.fusion.config import Config
 from axialnav.fusion.events import Events, pack_tables
 from axialnav.fusion.kernels.run import run
-from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, build_settings, new_memory, new_scratch
+from axialnav.fusion.memory import LOG_WIDTH, TRACK_WIDTH, build_settings, new_memory, new_scratch, whole_covariance
 from axialnav.fusion.sources import Kind, build_sources
 from axialnav.models.rig import RangeFinder
 from tests.fusion.made_flights import Scene, Table, fly, motion, stamps
@@ -82,7 +82,7 @@ def endless(imu_rate_hz: float, laps: int, seed: int = 17) -> Iterator[Lap]:
         updates = int(np.maximum(log[: len(lap.t_ns), 0], 0.0).sum())
         peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         core = memory.core
-        yield Lap(inertial + updates, spent, peak_mb, core["x"][0, 0].copy(), core["P"][0, 0].copy())
+        yield Lap(inertial + updates, spent, peak_mb, core["x"][0, 0].copy(), whole_covariance(core["P"][0, 0]))
 
 
 def _with_a_sharp_range_finder(scene: Scene) -> tuple[Config, Events]:

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from axialnav.fusion.batch import run_batch
+from axialnav.fusion.memory import whole_covariance
 from tests.fusion.inside import memories
 from tests.fusion.made_flights import MadeFlight, Scene, Table, fly, textbook
 
@@ -73,7 +74,7 @@ def errors_at_the_end(rig: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Error state (15,) truth minus estimate after 20 s, and its stated covariance."""
     flight = flown(rig, seed)
     ((t_ns, memory),) = memories(flight.config, flight.tables)
-    x, P, end = memory.core["x"][0, 0], memory.core["P"][0, 0], -1
+    x, P, end = memory.core["x"][0, 0], whole_covariance(memory.core["P"][0, 0]), -1
     assert int(memory.core["t_imu"][0]) == flight.tables["imu0"].t_ns[end] == t_ns
     attitude = Rotation.from_quat(x[6:10], scalar_first=True)
     error = [

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from axialnav.fusion.batch import BatchResult, run_batch
+from axialnav.fusion.kernels.rival import supervise_imu
+from axialnav.fusion.memory import build_settings, new_memory
 from axialnav.fusion.outcome import Health
 from tests.fusion.made_flights import MadeFlight, Scene, fly
 
@@ -88,3 +90,22 @@ def test_outliers_are_no_fault_of_the_accelerometer() -> None:
     for seed in range(30):
         flight = fly(Scene(seed=seed, sensors=RIG, outlier_share=0.05))
         assert not is_flagged(run_batch(flight.config, flight.tables)).any(), seed
+
+
+@pytest.mark.parametrize(("evidence", "least", "most"), [(0.0, 0.45, 0.55), (10.0, 0.95, 1.0)])
+@pytest.mark.parametrize("fault", [0, 1])
+def test_doubt_that_lasts_runs_the_rival_half_of_the_time_unless_it_does_better(
+    evidence: float, least: float, most: float, fault: int
+) -> None:
+    """A believed fault lasts by itself, and only trials that the healthy rival fails are followed by a rest."""
+    settings = build_settings(fly(Scene(duration_s=3.0, sensors=RIG)).config)
+    m, step_s, on_trial = new_memory(1).core[0], 0.01, 0
+    m["imu_fault"] = fault
+    for step in range(4000):
+        m["t_imu"] = round(1e9 * step_s * step)
+        m["correction"], m["correction_variance"] = 2.0 * step_s, 1e-6
+        m["evidence"] = evidence - (5.0 if fault else 0.0)
+        m["good_trials"] = 0
+        supervise_imu(step_s, m, settings[0])
+        on_trial += int(m["on_trial"])
+    assert least < on_trial / 4000 <= most

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from axialnav.fusion.memory import whole_covariance
 from tests.fusion.inside import memories
 from tests.fusion.made_flights import Scene, fly
 
@@ -16,7 +17,7 @@ from tests.fusion.made_flights import Scene, fly
 def test_covariance_stays_symmetric_and_positive(sensors: tuple[str, ...]) -> None:
     flight = fly(Scene(seed=7, duration_s=600.0, sensors=sensors, outlier_share=0.05))
     for _, memory in memories(flight.config, flight.tables, parts=200):
-        x, P = memory.core["x"][0, 0], memory.core["P"][0, 0]
+        x, P = memory.core["x"][0, 0], whole_covariance(memory.core["P"][0, 0])
         assert np.isfinite(x).all()
         assert np.linalg.norm(x[6:10]) == pytest.approx(1.0, abs=1e-12)
         sigma = np.sqrt(np.diag(P))
@@ -37,7 +38,7 @@ def test_silence_for_a_minute_then_readings_again_stays_finite() -> None:
         keep = (t < 10.0) | (t > 70.0)
         flight.tables[name] = type(table)(table.t_ns[keep], {k: v[keep] for k, v in table.columns.items()})
     for _, memory in memories(flight.config, flight.tables, parts=90):
-        P = memory.core["P"][0, 0]
+        P = whole_covariance(memory.core["P"][0, 0])
         sigma = np.sqrt(np.diag(P))
         assert np.linalg.eigvalsh(P / np.outer(sigma, sigma)).min() > -1e-9
     miss = np.linalg.norm(memory.core["x"][0, 0, :3] - flight.truth.position_m[-1])

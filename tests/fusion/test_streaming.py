@@ -12,6 +12,7 @@ from axialnav.fusion.batch import run_batch
 from axialnav.fusion.config import Config
 from axialnav.fusion.corridor import CorridorEstimator, NotStartedError
 from axialnav.fusion.errors import ReadingError
+from axialnav.fusion.memory import whole_covariance
 from axialnav.fusion.outcome import AxialState, Health, Reason, Verdict
 from axialnav.fusion.readings import Height, ImuSample, Reading, UwbFix, UwbRange, WallRange
 from axialnav.fusion.ring import CAPACITY
@@ -50,7 +51,7 @@ def test_pushed_in_order_the_state_is_the_replays_to_the_last_bit() -> None:
     made = flight()
     state = pushed(made.config, readings(made)).state()
     ((_, memory),) = memories(made.config, made.tables)
-    x, P = memory.core["x"][0, 0], memory.core["P"][0, 0]
+    x, P = memory.core["x"][0, 0], whole_covariance(memory.core["P"][0, 0])
     assert state.position_m.tobytes() == x[:3].tobytes()
     assert state.velocity_m_s.tobytes() == x[3:6].tobytes()
     assert state.quaternion_WB.tobytes() == x[6:10].tobytes()
