@@ -19,13 +19,14 @@ from __future__ import annotations
 
 import functools
 import gc
+import hashlib
 import importlib
 import operator
 from collections.abc import Iterator
 from typing import Any
 
 from numba import _dynfunc
-from numba.core import codegen, compiler, errors, typed_passes, typeinfer, types, untyped_passes
+from numba.core import codegen, compiler, errors, funcdesc, typed_passes, typeinfer, types, untyped_passes
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import Environment
@@ -165,6 +166,12 @@ class ScalarTypeInference(typed_passes.BaseTypeInference):  # type: ignore[misc]
         return True
 
 
+def _mangle(name: str, argument_types: tuple[Any, ...], *, abi_tags: Any = (), uid: Any = None) -> str:
+    """Symbol of a function, the same in every process; numba puts the number into it that a record has in this one."""
+    described = hashlib.sha256(repr(argument_types).encode()).hexdigest()[:24]
+    return str(funcdesc.default_mangler(name, (), abi_tags=(*abi_tags, described), uid=uid))
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(typed_passes.NativeLowering):  # type: ignore[misc]
     """Lowering of a part: no machine code."""
@@ -179,7 +186,11 @@ class PartLowering(typed_passes.NativeLowering):  # type: ignore[misc]
         state.library = PartLibrary(target.codegen(), function.func_qualname)
         state.library.call = function.modname, function.func_qualname, tuple(state.args)
         state.flags.no_compile = True
-        super().run_pass(state)
+        target.mangler = _mangle
+        try:
+            super().run_pass(state)
+        finally:
+            vars(target).pop("mangler", None)
         result = state["cr"]
         entry = _insert(target, result.fndesc, state.library, result.env)
         state["cr"] = result._replace(cfunc=entry)
