@@ -118,7 +118,7 @@ def _moved(a: Integer, judged: Integer, s: Record, seen: Record, m: Record, w: R
     Differences tell paths only beside each other: there, it is how far it changed otherwise than half of the others.
     """
     if s.kind != UWB_TDOA:
-        return _excess(a, -1, s, seen, m, w, c)
+        return _excess(a, np.int64(-1), s, seen, m, w, c)  # a literal would compile it once more
     beyond, near = 0, 0
     for b in range(s.n_anchors):
         excess = _excess(a, b, s, seen, m, w, c)

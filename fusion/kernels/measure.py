@@ -14,7 +14,7 @@ from axialnav.fusion.kernels.window import state_in_window
 from axialnav.fusion.outcome import Reason
 from axialnav.fusion.sources import Kind
 from axialnav.models.aiding import height, tilt
-from axialnav.models.jit import Record
+from axialnav.models.jit import Integer, Record
 from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import E_VEL, N_ERROR
 from axialnav.models.uwb import uwb_position, uwb_range, uwb_tdoa
@@ -115,7 +115,9 @@ def repetition(gap_s: float, correlation_s: float) -> float:
 
 
 @kernel
-def _uwb_variance(claimed_sigma: float, place: int, other: int, s: Record, seen: Record, w: Record, c: Record) -> float:
+def _uwb_variance(
+    claimed_sigma: float, place: Integer, other: Integer, s: Record, seen: Record, w: Record, c: Record
+) -> float:
     """White variance of a reading; paths without a place add their bias and make readings repeat each other."""
     variance = variance_of(claimed_sigma, s.sigma)
     if place < 0 or other < 0:
@@ -143,7 +145,7 @@ def _measure_uwb_range(
         return -OUT_OF_RANGE
     place = place_of(t_ns, a, s, m, c)
     w.h[0] = uwb_range(x, w.p, w.R, s.lever_B, s.anchors[a], place, w.H[0])
-    w.variance[0] = _uwb_variance(values[2], place, 0, s, seen, w, c) * obstructed(values[3] - values[4], c)
+    w.variance[0] = _uwb_variance(values[2], place, np.int64(0), s, seen, w, c) * obstructed(values[3] - values[4], c)
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 
@@ -165,7 +167,7 @@ def _measure_fix(t_ns: int, s: Record, seen: Record, values: Array, x: Array, m:
         place = place_of(t_ns, i, s, m, c)
         w.z[i] = values[i]
         w.h[i] = uwb_position(x, w.p, w.R, s.lever_B, i, place, w.H[i])
-        w.variance[i] = _uwb_variance(values[3 + i], place, 0, s, seen, w, c)
+        w.variance[i] = _uwb_variance(values[3 + i], place, np.int64(0), s, seen, w, c)
     return 3
 
 

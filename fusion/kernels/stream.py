@@ -17,7 +17,7 @@ from axialnav.fusion.kernels.run import run
 from axialnav.fusion.memory import LOG_WIDTH, MEMORY, SCRATCH, SETTINGS, SOURCE_MEMORY, TRACK_WIDTH
 from axialnav.fusion.ring import HEAD, INBOX
 from axialnav.fusion.sources import SOURCE
-from axialnav.models.jit import Record, Records
+from axialnav.models.jit import Record, Records, addresses_at
 from axialnav.models.jit import kernel as array_kernel
 from axialnav.models.scalar_kernel import kernel
 
@@ -33,11 +33,12 @@ WORD, REAL = np.dtype(np.int64), np.dtype(np.float64)
 
 
 @array_kernel  # the arrays are made here
-def take_at(block: Any) -> int:
-    """Run :func:`take` on the arrays at the addresses in ``block``, in the order of ``ADDRESSES``.
+def take_at(address: int) -> int:
+    """Run :func:`take` on the arrays whose addresses stand at ``address``, in the order of ``ADDRESSES``.
 
     One address as the only argument: handing over seventeen arrays would cost more than the filter.
     """
+    block: Any = addresses_at(address)
     (head, t_ns, source, values, slot, free, kept, live, core, memory, inbox, sources, scratch, settings, out, track,
      sizes) = block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8], block[9], \
         block[10], block[11], block[12], block[13], block[14], block[15], block[16]  # fmt: skip

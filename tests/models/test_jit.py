@@ -74,25 +74,30 @@ def test_a_part_is_compiled_once_and_read_from_disk_for_another_whole(tmp_path: 
     assert outer_of_three(tmp_path) == "6.0"
 
 
-def test_what_another_process_kept_meanwhile_fits_what_this_one_compiles(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("field", "argument"), [("", "3.0"), (".a", "numpy.array([(3.0,)], [('a', 'f8')])[0]")])
+def test_what_another_process_kept_meanwhile_fits_what_this_one_compiles(
+    tmp_path: Path, field: str, argument: str
+) -> None:
     """Two programs that start together for the first time compile half of the kernels each and link the other's half.
 
-    Were functions or files numbered as they come, each would look for what the other calls something else; that ended
-    in a crash of the process.
+    Were functions, files or the types of records numbered as they come, each would look for what the other calls
+    something else; that ended in a crash of the process.
     """
     decorator = DECORATORS[1]
     package = copy_of_the_package(tmp_path, decorator)
-    (package / "models" / "inner.py").write_text(INNER.format(factor=2.0, decorator=decorator))
+    inner = INNER.format(factor=2.0, decorator=decorator).replace("* x", f"* x{field}")
+    (package / "models" / "inner.py").write_text(inner)
     (package / "models" / "top.py").write_text(
         CALLER.format(decorator=decorator).replace("inner", "outer").replace("def outer", "def top")
     )
-    say = "import numba; numba.njit(lambda: 1)(); from axialnav.models.top import top; print(top(3.0))"
-    assert outer_of_three(tmp_path, say) == "6.0"
+    say = f"import numpy; from axialnav.models.top import top; print(top({argument}))"
+    others = "import numba, numpy; numba.njit(lambda: 1)(); numba.typeof(numpy.zeros(1, [('b', 'f8')])); "
+    assert outer_of_three(tmp_path, others + say) == "6.0"
     for kept in (tmp_path / "cache").rglob("inner.inner*"):
         kept.unlink()  # this process had read an empty index just before the other wrote it
     for kept in (tmp_path / "cache").rglob("top.top*"):
         kept.unlink()
-    assert outer_of_three(tmp_path, "from axialnav.models.top import top; print(top(3.0))") == "6.0"
+    assert outer_of_three(tmp_path, say) == "6.0"
 
 
 def test_two_processes_that_keep_different_overloads_do_not_take_the_same_file(tmp_path: Path) -> None:
