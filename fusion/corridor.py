@@ -200,7 +200,9 @@ class CorridorEstimator:
         if axes < 0:
             return self._record(reading, Reason(-int(axes)))
         verdict, reason = FUSED if weight > MIN_WEIGHT else REFUSED[int(code)]
-        innovation, variance = (y0, y1, y2)[: int(axes)], (s0, s1, s2)[: int(axes)]
+        # most readings have one axis, for which two slices take longer than the rest of this
+        n = int(axes)
+        innovation, variance = ((y0,), (s0,)) if n == 1 else ((y0, y1, y2)[:n], (s0, s1, s2)[:n])
         return Outcome(reading.t_ns, reading.sensor, verdict, reason, innovation, variance, nis, gate, weight)
 
     def _axial_state(self, t_ns: int, memory: Memory, flags: Health) -> AxialState:
