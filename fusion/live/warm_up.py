@@ -40,8 +40,10 @@ from axialnav.models.rig import (
 
 STEP_NS = 10_000_000
 USUAL_CAMERA_HZ = 30.0
-STEP_PX = 9
-SHAKE_PX = 2
+WALLS = (  # step from frame to frame, roll of every other one [px], pattern of the pixels [grey values]
+    *((0, 1, 0.0), (2, 0, 3.0), (2, 3, 3.0)),
+    *((9, 0, 0.0), (9, 2, 0.0)),
+)
 CONTRAST = 30.0
 ROUGHNESS = 0.03  # cycles a pixel, up to which the wall has all its texture
 
@@ -101,19 +103,21 @@ def _aid(name: str, spec: AnySensor, t_ns: int) -> Iterator[Reading]:
 def warm_camera(config: Config, name: str, spec: Camera) -> None:
     """Measure the motion of a made-up wall: of pictures that are refused early, little would be compiled."""
     period_ns = round(1e9 / (spec.rate_hz or USUAL_CAMERA_HZ))
-    for exposure_s, step_px, shake_px in ((None, 0, 0), (0.3e-9 * period_ns, STEP_PX, SHAKE_PX)):
+    for exposure_s, step_px, shake_px, pattern in [(None, 0, 0, 0.0), *((0.3e-9 * period_ns, *wall) for wall in WALLS)]:
         feed = CameraFeed(config)
-        for k, image in enumerate(wall_pictures(spec.resolution, config.camera.frames + 2, step_px, shake_px)):
+        count = 3 * config.camera.frames  # some things are looked at once in a while only
+        for k, image in enumerate(wall_pictures(spec.resolution, count, step_px, shake_px, pattern)):
             with suppress(FrameError):
                 feed.push(CameraFrame(t_ns=k * period_ns, sensor=name, image=image, exposure_s=exposure_s))
 
 
 def wall_pictures(
-    resolution: tuple[int, int], count: int, step_px: int, shake_px: int = 0
+    resolution: tuple[int, int], count: int, step_px: int, shake_px: int = 0, pattern: float = 0.0
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures of a rough wall that passes by, shape (height, width), each with its own noise.
 
-    Every other picture is rolled, so that its upper and lower edges move by ``shake_px`` either way.
+    Every other picture is rolled, so that its upper and lower edges move by ``shake_px`` either way.  The pixels differ
+    among themselves by ``pattern`` grey values, always in the same way.
     """
     width, height = resolution
     whole = width + step_px * count + 2 * shake_px
@@ -124,7 +128,8 @@ def wall_pictures(
     wall *= CONTRAST / wall.std()
     rolled = np.round(shake_px * np.linspace(-1.0, 1.0, height)).astype(np.int64)
     columns = np.arange(width)
+    fixed = pattern * rng.normal(size=(height, width))
     for k in range(count):
         first = shake_px + step_px * k + (rolled if k % 2 else np.zeros_like(rolled))
         seen = np.take_along_axis(wall, first[:, None] + columns, axis=1)
-        yield np.clip(128.0 + seen + rng.normal(0.0, 1.0, seen.shape), 0.0, 255.0).astype(np.uint8)
+        yield np.clip(128.0 + fixed + seen + rng.normal(0.0, 1.0, seen.shape), 0.0, 255.0).astype(np.uint8)
