@@ -22,7 +22,7 @@ from axialnav.replay.sweep.results import JOURNAL, TABLE, Journal
 from axialnav.replay.sweep.sweep import sweep
 from tests.replay.made_recordings import flown
 
-GRID = {"uwb.sigma_m": ["0.2", "0.3", "0.4"], "imu.accel_noise_scale": ["1.0", "2.0"]}
+GRID = {"uwb.range_sigma_m": ["0.2", "0.3", "0.4"], "imu.accel_noise_scale": ["1.0", "2.0"]}
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_the_table_holds_every_replay_once(flights: list[Path], alone: list[dict
     table = parquet.read_table(tmp_path / TABLE)
     assert table.column("key").to_pylist() == [job.key for job in jobs]
     assert table.column("digest").to_pylist() == digests(alone)
-    assert table.column("param.uwb.sigma_m").to_pylist()[:2] == ["0.2", "0.2"]
+    assert table.column("param.uwb.range_sigma_m").to_pylist()[:2] == ["0.2", "0.2"]
 
 
 def test_a_sweep_goes_on_where_it_was_killed(
@@ -198,7 +198,7 @@ def test_the_page_averages_over_flights_and_escapes(alone: list[dict[str, object
     groups = by_settings(alone)
     assert len(groups) == 6
     params, count, means = groups[0]
-    assert (params, count) == ({"uwb.sigma_m": "0.2", "imu.accel_noise_scale": "1.0"}, 2)
+    assert (params, count) == ({"uwb.range_sigma_m": "0.2", "imu.accel_noise_scale": "1.0"}, 2)
     same = [row["axial_rmse"] for row in (alone[0], alone[6])]
     assert means["axial_rmse"] == pytest.approx(sum(same) / 2)  # type: ignore[arg-type]
     page = sweep_page([{**alone[0], "flight": "<script>"}])

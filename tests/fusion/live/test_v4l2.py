@@ -104,4 +104,4 @@ def test_a_camera_that_comes_back_is_opened_anew_with_its_settings(driver: Path,
     pictures = re.search(r"(\d+) pictures\n", told.stdout)
     assert pictures is not None
     assert int(pictures[1]) > 45
-    assert "gaps 1 " in told.stdout
+    assert re.search(r"gaps [1-9]", told.stdout)
