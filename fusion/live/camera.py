@@ -96,6 +96,10 @@ class MotionStage:
     ----------
     counts
         ``measured``, ``refused`` (no motion to be believed) and ``unusable`` pictures.
+
+    Notes
+    -----
+    ``deliver`` takes the motion and its last picture, ``miss`` is called when there is none; ``see`` gets every frame.
     """
 
     COUNTED = ("measured", "refused", "unusable")
@@ -108,9 +112,11 @@ class MotionStage:
         deliver: Callable[[PixelMotion, Picture], None],
         clock: Callable[[], int],
         see: Callable[[CameraFrame, int], None] | None = None,
+        miss: Callable[[], None] = lambda: None,
     ) -> None:
         self.counts: Counter[str] = Counter()
         self.latency = Latency()
+        self._miss = miss
         self._config, self._sensor, self._mailbox = config, sensor, mailbox
         self._deliver, self._clock, self._see = deliver, clock, see
         self._feed = CameraFeed(config)
@@ -141,6 +147,8 @@ class MotionStage:
         self.counts["refused" if motion is None else "measured"] += 1
         if motion is not None:
             self._deliver(motion, picture)
+        else:
+            self._miss()
 
 
 def require_surface(config: Config, sensor: str) -> None:

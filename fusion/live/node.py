@@ -121,8 +121,8 @@ class Node:
     def _add_camera(self, sensor: str, source: Source) -> None:
         config = self._vehicle.filter
         self._grabber = Grabber(source, config.sensor[sensor].rate_hz)
-        see = self._recording.frame if self._recording else None
-        self._motion = MotionStage(config, sensor, self._grabber.mailbox, self._deliver_motion, self._clock, see)
+        see, miss = self._recording.frame if self._recording else None, self.output.frame_missed
+        self._motion = MotionStage(config, sensor, self._grabber.mailbox, self._deliver_motion, self._clock, see, miss)
 
     def start(self) -> None:
         """Start every thread."""
@@ -281,6 +281,8 @@ class Node:
             outcome = self._deliver(seen.motion, seen.measured_ns)
             if outcome is not None and outcome.verdict is Verdict.FUSED:
                 self.output.frame_fused(seen.picture_ns)
+            else:
+                self.output.frame_missed()
 
     def _restart(self, reason: str) -> None:
         self.core.restart(reason, self._clock())

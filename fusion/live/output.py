@@ -73,7 +73,13 @@ class Output:
         """A picture that was taken at ``frame_ns`` has been fused: do not wait for the next period."""
         with self._wake:
             self._frame_ns = frame_ns
-            self._schedule.frame_fused(self._clock())
+            self._schedule.frame_done(self._clock())
+            self._wake.notify()
+
+    def frame_missed(self) -> None:
+        """A picture told nothing: what is known is sent now, not when the next picture is due."""
+        with self._wake:
+            self._schedule.frame_done(self._clock())
             self._wake.notify()
 
     def run(self, stop: threading.Event) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 SPACING_NS = 21_000_000  # ArduPilot drops what comes within 20 ms
 DELTA_SPACING_NS = 52_000_000  # and deltas within 50 ms
-WAIT_FOR_FRAME = 1.35  # periods that a late frame is waited for; after one that never comes the next still finds 21 ms
+WAIT_FOR_FRAME = 1.6  # periods that a late frame is waited for: a message just before it would hold its own up
 FRAMES_STOPPED_NS = 200_000_000
 
 
@@ -18,8 +18,8 @@ class Schedule:
         self._due_ns: int | None = None
         self._frame_ns = -FRAMES_STOPPED_NS
 
-    def frame_fused(self, now_ns: int) -> None:
-        """A camera frame has just changed the estimate: send as soon as the spacing allows."""
+    def frame_done(self, now_ns: int) -> None:
+        """A camera frame has just changed the estimate, or told nothing: send as soon as the spacing allows."""
         self._frame_ns = now_ns
         self._due_ns = now_ns
 

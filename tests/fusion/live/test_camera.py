@@ -150,6 +150,19 @@ def test_another_size_begins_again_instead_of_failing() -> None:
     assert len(found) == 4
 
 
+def test_a_picture_that_tells_nothing_is_told_of_at_once() -> None:
+    """The message of its period goes out then, and not when the next picture should be there."""
+    found: list[PixelMotion] = []
+    missed: list[bool] = []
+    queue: Any = BoundedQueue(1)
+    stage = MotionStage(
+        CONFIG, "cam0", queue, lambda motion, _: found.append(motion), lambda: 0, miss=lambda: missed.append(True)
+    )
+    for number in (*range(6), 5, 5, 5):  # the driver hands out one picture again and again
+        stage.measure(Picture((len(found) + len(missed)) * PERIOD_NS, 0, wall(number), None))
+    assert (len(found), len(missed)) == (stage.counts["measured"], stage.counts["refused"]) == (2, 7)
+
+
 # a driver -----------------------------------------------------------------------------------------------------------
 
 

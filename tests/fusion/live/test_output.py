@@ -218,7 +218,7 @@ def run_schedule(schedule: Schedule, frames_ns: list[int], until_ns: int) -> lis
     sent, frames = [], list(frames_ns)
     for tick in range(0, until_ns, MS // 2):
         while frames and frames[0] <= tick:
-            schedule.frame_fused(frames.pop(0))
+            schedule.frame_done(frames.pop(0))
         if schedule.wait_ns(tick) == 0:
             schedule.taken()
             schedule.sent(tick)
