@@ -40,6 +40,7 @@ def follow(
     """
 
     def cut(drift_px: float) -> Products:
+        """Products of windows that follow a drift [px per frame]."""
         return window.following(start_px, drift_px, reach).selected(strips)
 
     harmless_px = DRIFT_SHARE * window.bin_height / (len(window.order) - 1)

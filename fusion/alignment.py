@@ -164,6 +164,7 @@ def _locate(kind: int, rows: Array, anchors: Array) -> Array:
     a, measured = rows[good, 0].astype(int), rows[good, column]
 
     def residual(p: Array) -> Array:
+        """Differences of distance at a place (3,) less those measured [m]."""
         distance = np.linalg.norm(p - anchors, axis=1)
         if kind == int(Kind.UWB_RANGE):
             return np.asarray(distance[a] - measured)

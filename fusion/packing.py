@@ -61,6 +61,7 @@ def _attitude(r: Attitude) -> Row:
 
 def _range_packer(anchors: dict[str, int]) -> Callable[[UwbRange], Row]:
     def pack(r: UwbRange) -> Row:
+        """Row of a range."""
         powers = _or_nan(r.rssi_dbm), _or_nan(r.first_path_dbm)
         return (anchors.get(r.anchor, -1), r.range_m, _or_nan(r.sigma_m), *powers, nan, nan, nan)
 
@@ -69,6 +70,7 @@ def _range_packer(anchors: dict[str, int]) -> Callable[[UwbRange], Row]:
 
 def _tdoa_packer(anchors: dict[str, int]) -> Callable[[UwbTdoa], Row]:
     def pack(r: UwbTdoa) -> Row:
+        """Row of a difference."""
         pair = anchors.get(r.anchor_a, -1), anchors.get(r.anchor_b, -1)
         return (*pair, r.difference_m, _or_nan(r.sigma_m), nan, nan, nan, nan)
 

@@ -93,6 +93,7 @@ def addresses_at(typing: Any, address: Any) -> Any:
     pointer = numba.types.CPointer(numba.types.voidptr)
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """Read the number as an address."""
         return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
     return pointer(numba.types.uintp), lower

@@ -88,6 +88,7 @@ def _maker(kind: type[Reading], sensor: str, table: SensorTable) -> Callable[[in
     columns |= {name: table.anchor_names(name) for name in ANCHOR_FIELDS if name in columns}
 
     def make(row: int) -> Reading:
+        """Reading of a row."""
         fields: dict[str, Any] = {name: values[row] for name, values in columns.items()}
         return kind(t_ns=t_ns[row], sensor=sensor, **fields)
 

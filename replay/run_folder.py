@@ -70,6 +70,7 @@ def write_innovations(path: Path, log: InnovationLog) -> None:
     from pyarrow import parquet
 
     def names(codes: Any, words: list[str]) -> Any:
+        """Codes as a column of words."""
         return pa.DictionaryArray.from_arrays(pa.array(codes.astype(np.int32)), pa.array(words, pa.string()))
 
     columns: dict[str, Any] = {

@@ -74,6 +74,7 @@ class _Recording:
         self._rr, self._stream, self._run = rr, stream, run
 
     def write(self) -> None:
+        """Write the whole run."""
         motion = alignment_of(self._run)
         self._path(motion)
         self._velocity(motion)

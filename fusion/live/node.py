@@ -121,7 +121,7 @@ class Node:
     def _add_camera(self, sensor: str, source: Source) -> None:
         config = self._vehicle.filter
         self._grabber = Grabber(source, config.sensor[sensor].rate_hz)
-        see, miss = self._recording.frame if self._recording else None, self.output.frame_missed
+        see, miss = self._recording.frame if self._recording else None, self.output.frame_done
         self._motion = MotionStage(config, sensor, self._grabber.mailbox, self._deliver_motion, self._clock, see, miss)
 
     def start(self) -> None:
@@ -279,10 +279,8 @@ class Node:
             if seen is None:
                 return
             outcome = self._deliver(seen.motion, seen.measured_ns)
-            if outcome is not None and outcome.verdict is Verdict.FUSED:
-                self.output.frame_fused(seen.picture_ns)
-            else:
-                self.output.frame_missed()
+            fused = outcome is not None and outcome.verdict is Verdict.FUSED
+            self.output.frame_done(seen.picture_ns if fused else None)
 
     def _restart(self, reason: str) -> None:
         self.core.restart(reason, self._clock())

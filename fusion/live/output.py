@@ -69,16 +69,11 @@ class Output:
         self._frame_ns: int | None = None
         self._before: Snapshot | None = None
 
-    def frame_fused(self, frame_ns: int) -> None:
-        """A picture that was taken at ``frame_ns`` has been fused: do not wait for the next period."""
+    def frame_done(self, fused_ns: int | None = None) -> None:
+        """A picture taken at ``fused_ns`` has been fused, or one told nothing: do not wait for the next period."""
         with self._wake:
-            self._frame_ns = frame_ns
-            self._schedule.frame_done(self._clock())
-            self._wake.notify()
-
-    def frame_missed(self) -> None:
-        """A picture told nothing: what is known is sent now, not when the next picture is due."""
-        with self._wake:
+            if fused_ns is not None:
+                self._frame_ns = fused_ns
             self._schedule.frame_done(self._clock())
             self._wake.notify()
 

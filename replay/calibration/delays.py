@@ -51,6 +51,7 @@ def _best_shift(
     costs: dict[float, float] = {}
 
     def look(shifts: list[float]) -> None:
+        """Ask for the costs of shifts [s] that are not known yet."""
         new = [round(shift, 6) for shift in shifts if round(shift, 6) not in costs]
         points = [np.full(len(sensors), shift / DELAY_SCALE_S) for shift in new]
         costs.update(zip(new, cost(points) if points else [], strict=True))

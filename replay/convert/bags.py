@@ -48,6 +48,7 @@ def _write(flight: Flight, path: Path, *, ros1: bool) -> None:
     connections: dict[str, Any] = {}
 
     def write(topic: str, kind: str, t_ns: int, data: bytes) -> None:
+        """Write one message, its connection first where it is new."""
         if topic not in connections:
             connections[topic] = writer.add_connection(topic, kind, typestore=store)
         payload = store.cdr_to_ros1(data, kind) if ros1 else data

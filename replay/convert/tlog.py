@@ -47,6 +47,7 @@ def _records(flight: Flight) -> Iterator[bytes]:
     base_us = 0 if start_ns > 1e9 * EPOCH_US / 1e6 else EPOCH_US
 
     def record(t_ns: int, message: Any) -> bytes:
+        """Bytes of a message with its stamp before it."""
         packet: bytes = message.pack(link)
         link.seq = (link.seq + 1) % 256
         arrival_us = base_us + (t_ns if not base_us else t_ns - start_ns) // 1000
@@ -95,6 +96,7 @@ def _boot_ms(t_ns: int, start_ns: int) -> int:
 
 def _imu(rotation: NDArray[np.float64], start_ns: int) -> Packer:
     def pack(t_ns: int, values: list[float]) -> Any:
+        """Message of an inertial sample."""
         gyro, accel = rotation @ values[:3], rotation @ values[3:6]
         stamp_us = (t_ns - start_ns) // 1000
         rest = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0x3F)
@@ -107,6 +109,7 @@ def _distance(spec: RangeFinder, start_ns: int) -> Packer:
     low, high = (round(min(limit, 655.0) * 100) for limit in (spec.range_min_m, spec.range_max_m))
 
     def pack(t_ns: int, values: list[float]) -> Any:
+        """Message of a range [m]."""
         centimetres = min(round(values[0] * 100), 65535)
         return dialect.MAVLink_distance_sensor_message(
             _boot_ms(t_ns, start_ns), low, high, centimetres, 0, 0, DOWN, 255
@@ -119,6 +122,7 @@ def _flow(spec: Flow, start_ns: int) -> Packer:
     fu, fv = spec.focal_px
 
     def pack(t_ns: int, values: list[float]) -> Any:
+        """Message of image motion."""
         window_us = round(values[0] * 1e6)
         end_us = (t_ns - start_ns) // 1000 + window_us // 2
         dy = 0.0 if np.isnan(values[2]) else values[2]

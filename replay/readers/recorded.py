@@ -196,6 +196,7 @@ def _camera(
     fetch: list[Callable[[], Payload]] = [topic.pictures[k] for k in order.tolist()]
 
     def pictures() -> Iterator[NDArray[np.generic]]:
+        """Pictures one by one, each fetched when it is asked for."""
         for one in fetch:
             yield message.decode(one())
 

@@ -61,6 +61,7 @@ def _picture_stream(topic: Topic, path: Path) -> Stream:
     fetch: list[Callable[[], Payload]] = [topic.pictures[k] for k in order.tolist()]
 
     def pictures() -> Iterator[NDArray[np.generic]]:
+        """Pictures one by one, each fetched when it is asked for."""
         for one in fetch:
             yield message.decode(one())
 

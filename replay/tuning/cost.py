@@ -114,6 +114,7 @@ class Cost:
         jobs = [(index, point) for index in range(len(self._subjects)) for point in points]
 
         def one(job: tuple[int, Array]) -> Evidence:
+            """Evidence of one flight at one point."""
             index, point = job
             return collect(self._trial(self._subjects[index], point), self._counts[index])
 

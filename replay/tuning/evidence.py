@@ -54,6 +54,7 @@ def collect(trial: Trial, counts: Ints, margin_s: float = 0.0) -> Evidence:
     size = int(counts.sum())
 
     def placed(values: NDArray[np.generic]) -> NDArray[np.generic]:
+        """Values in their places among all readings, zero elsewhere."""
         filled = np.zeros((size, *values.shape[1:]), values.dtype)
         filled[place] = values[rows]
         return filled

@@ -98,6 +98,7 @@ class CameraOnBoard:
         """Camera poses around an instant: position [m] and rotation R_WS at delays [s]."""
 
         def at(delay: Array) -> tuple[Array, Array]:
+            """State a delay (n,) [s] after the stamps."""
             t = t_s + delay
             body = self._trajectory.rotation(t)
             position = self._trajectory.position(t) + body.apply(self._lever)
