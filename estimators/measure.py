@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.cohesion import coherence_px
 from axialnav.estimators.drift import cross_or_nan
 from axialnav.estimators.evenness import (
     Residual,
@@ -149,6 +150,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         acceleration_px=float(fit.motion[1]) if len(fit.motion) == 2 else 0.0,
         bands=votes,
         cross_sigma_px=cross_sigma_px,
+        coherence_px=coherence_px(fit, products),
     )
 
 

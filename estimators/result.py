@@ -65,6 +65,9 @@ class MotionEstimate:
         What happened to the window (a gap that emptied the ring), or "".
     cross_sigma_px
         Standard deviation of ``cross_px`` [px]; NaN where that is.
+    coherence_px
+        How far apart parts of the picture may move per frame period and still be taken for one [px]; NaN where the
+        method does not tell.
     """
 
     displacement_px: float
@@ -81,6 +84,7 @@ class MotionEstimate:
     t_ns: int | None = None
     note: str = ""
     cross_sigma_px: float = math.nan
+    coherence_px: float = math.nan
 
     def __post_init__(self) -> None:
         if self.accepted and not (math.isfinite(self.displacement_px) and 0.0 < self.sigma_px < math.inf):

@@ -60,6 +60,7 @@ class CameraFeed:
             dy_px=estimate.cross_px if seen else None,
             sigma_px=math.hypot(estimate.sigma_px, rotation_px[0]),
             sigma_dy_px=math.hypot(estimate.cross_sigma_px, rotation_px[1]) if seen else None,
+            coherence_px=estimate.coherence_px if math.isfinite(estimate.coherence_px) else None,
         )
 
 

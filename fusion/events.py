@@ -4,7 +4,7 @@ An event is (t_ns, source, values[8]).  Columns by kind:
 
 =============  =====================================================================
 IMU            gyro x y z [rad/s], accel x y z [m/s^2]
-FLOW           window [s], dx, dy [px], sigma [px], quality, sigma of dy [px]
+FLOW           window [s], dx, dy [px], sigma [px], quality, sigma of dy [px], coherence [px]
 BLUR           window [s], length [px], sigma [px]
 RANGE          range, sigma [m]
 UWB_RANGE      anchor, range, sigma [m], rssi, first path [dBm]
@@ -32,7 +32,7 @@ from axialnav.fusion.sources import Kind, fused_sensors, kind_of
 WIDTH = 8
 COLUMNS: dict[Kind, tuple[str, ...]] = {
     Kind.IMU: ("gyro_rad_s", "accel_m_s2"),
-    Kind.FLOW: ("window_s", "dx_px", "dy_px", "sigma_px", "quality", "sigma_dy_px"),
+    Kind.FLOW: ("window_s", "dx_px", "dy_px", "sigma_px", "quality", "sigma_dy_px", "coherence_px"),
     Kind.BLUR: ("window_s", "length_px", "sigma_px"),
     Kind.RANGE: ("range_m", "sigma_m"),
     Kind.UWB_RANGE: ("anchor", "range_m", "sigma_m", "rssi_dbm", "first_path_dbm"),

@@ -35,8 +35,8 @@ def _imu(r: ImuSample) -> Row:
 
 
 def _pixel_motion(r: PixelMotion) -> Row:
-    own = _or_nan(r.sigma_px), _or_nan(r.quality), _or_nan(r.sigma_dy_px)
-    return (r.window_s, r.dx_px, _or_nan(r.dy_px), *own, nan, nan)
+    own = _or_nan(r.sigma_px), _or_nan(r.quality), _or_nan(r.sigma_dy_px), _or_nan(r.coherence_px)
+    return (r.window_s, r.dx_px, _or_nan(r.dy_px), *own, nan)
 
 
 def _blur_length(r: BlurLength) -> Row:

@@ -69,6 +69,7 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
 
     ``dy_px`` is None for one-axis estimates; ``sigma_px`` None means the sensor's configured value; ``quality`` is the
     chip's own figure, 0 meaning unusable; ``sigma_dy_px`` None means that ``sigma_px`` is that of both axes.
+    ``coherence_px`` is how far apart parts of a camera's picture may have moved and still have been taken for one.
     """
 
     window_s: float
@@ -77,6 +78,7 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
     sigma_px: float | None = None
     quality: float | None = None
     sigma_dy_px: float | None = None
+    coherence_px: float | None = None
 
     def __post_init__(self) -> None:
         self._stamp()
@@ -86,6 +88,7 @@ class PixelMotion(Reading, frozen=True, kw_only=True):
             self._finite("dy_px", self.dy_px, -1e5, 1e5)
         _sigma(self, "sigma_px", self.sigma_px)
         _sigma(self, "sigma_dy_px", self.sigma_dy_px)
+        _sigma(self, "coherence_px", self.coherence_px)
 
 
 class CameraFrame(Reading, frozen=True, kw_only=True, eq=False):

@@ -28,7 +28,7 @@ from axialnav.models.rig import (
 )
 
 Records = NDArray[np.void]
-COHERENCE_PX = 2.4  # how far parts of a picture may drift apart over a window of frames and still be seen as one
+COHERENCE_PX = 2.6  # how far parts of a picture may drift apart over a window and be seen as one; readings may know
 
 
 class Kind(IntEnum):
@@ -59,7 +59,8 @@ SOURCE = np.dtype(
         ("lever_B", "f8", 3),
         ("focal_px", "f8", 2),
         ("half_view", "f8"),  # half of a camera's picture over its focal length, 0 for what has no picture
-        ("coherence_px", "f8"),
+        ("coherence_px", "f8"),  # of readings that tell none
+        ("periods", "f8"),  # between the first and the last frame that a reading was measured from
         ("normal_W", "f8", 3),
         ("offset_m", "f8"),
         ("offset_is_state", "?"),
@@ -149,6 +150,7 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         "focal_px": [1.0, 1.0],
         "half_view": 0.0,
         "coherence_px": 1.0,
+        "periods": 1.0,
         "normal_W": [0.0, 0.0, 1.0],
         "offset_m": 0.0,
         "offset_is_state": False,
@@ -172,6 +174,7 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
             "focal_px": spec.focal_px,
             "half_view": 0.5 * spec.resolution[0] / spec.focal_px[0],
             "coherence_px": COHERENCE_PX / (config.camera.frames - 1),
+            "periods": float(config.camera.frames - 1),
         }
     if isinstance(spec, RangeFinder):
         row |= {"low": spec.range_min_m, "high": spec.range_max_m}

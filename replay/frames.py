@@ -60,6 +60,7 @@ def motion_table(flight: Flight, camera: str, config: Config) -> SensorTable:
             "dy_px": np.array([e.cross_px for e in estimates]),
             "sigma_px": np.hypot([e.sigma_px for e in estimates], along),
             "sigma_dy_px": np.hypot([e.cross_sigma_px for e in estimates], across),
+            "coherence_px": np.array([e.coherence_px for e in estimates]),
         },
     )
 

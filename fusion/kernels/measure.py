@@ -179,11 +179,12 @@ def _measure_flow(t_ns: int, s: Record, values: Array, x: Array, P: Array, m: Re
         return -NO_MOTION
     axes = 2 if np.isfinite(values[2]) else 1
     state_in_window(t_ns, values[0], x, m, w)
+    coherence_px = values[6] if np.isfinite(values[6]) else s.coherence_px
     for i in range(axes):
         w.z[i] = values[1 + i]
         sigma = values[5] if i == 1 and np.isfinite(values[5]) else values[3]
         w.variance[i] = sigma**2 if np.isfinite(sigma) else s.sigma**2
-        w.h[i] = motion_of_picture(s, values[0], i, w)
+        w.h[i] = motion_of_picture(s, values[0], coherence_px, i, w)
     if not np.isfinite(w.h[0]):
         return -NO_GEOMETRY
     if axes == 2 and s.half_view > 0.0 and not _believable(s, P, w):

@@ -6,13 +6,15 @@ lets go of those that leave them by more than the texture's coherence.  The pred
 :math:`u_k` of some columns,
 
 .. math::
-    u = \frac{\sum_k g_k u_k}{\sum_k g_k}, \qquad g_k = \exp \left( -\frac{(u_k - u)^2}{2 s^2} \right)
+    u = \frac{\sum_k g_k u_k}{\sum_k g_k}, \qquad g_k = c_k \exp \left( -\frac{(u_k - u)^2}{2 s^2} \right)
 
-solved from the middle column outwards.  How far the columns in use are apart is how little such a mean can be trusted.
-What the picture does across is seen in the columns that the rows follow: the mean with the same weights.
+solved from the middle column outwards; :math:`c_k` is the share of a column that stays in view over the window.  The
+coherence s comes with the reading: it is where the pull of a column that moves otherwise is the strongest.  How far the
+columns in use are apart is how little such a mean can be trusted.  What the picture does across is seen in the columns
+that the rows follow: the mean with the same weights.
 
 Source: location by weighted means as in Huber and Ronchetti, Robust Statistics (2009), section 4.8, with Welsch's
-weight; coherence s and the share of the spread were measured on rendered turns (docs/filter/pixel-motion.md).
+weight; the shares of the view and of the spread were measured on rendered turns (docs/filter/pixel-motion.md).
 """
 
 from __future__ import annotations
@@ -31,6 +33,8 @@ from axialnav.models.state import N_ERROR, WALL_OFFSET
 
 Array = NDArray[np.float64]
 ROUNDS = 6
+VIEW = 0.85  # of what stays in view: windows of frames end in flanks
+LEAST_VIEW = 0.5  # stays in view of what an estimator can follow
 SPREAD_SHARE = 0.5
 
 
@@ -72,7 +76,7 @@ def motion_at_slope(s: Record, window_s: float, axis: Integer, slope: float, w: 
 
 
 @kernel
-def motion_of_picture(s: Record, window_s: float, axis: Integer, w: Record) -> float:
+def motion_of_picture(s: Record, window_s: float, coherence_px: float, axis: Integer, w: Record) -> float:
     """Predict the motion [px] of the whole picture, its Jacobian row, and add to ``w.variance[axis]`` for its spread.
 
     The columns that count along the rows (axis 0, to be asked first) are those that count across them (axis 1).
@@ -91,7 +95,11 @@ def motion_of_picture(s: Record, window_s: float, axis: Integer, w: Record) -> f
         w.column[k] = motion_at_slope(s, window_s, axis, s.half_view * (2.0 * k - (COLUMNS - 1)) / COLUMNS, w)
         for i in range(N_ERROR):
             w.column_H[k, i] = w.H[axis, i]
-    motion, variance = _together(s.coherence_px, centre, w) if axis == 0 else _weighted(w)
+    if axis == 0:
+        left = s.periods * abs(centre) / (2.0 * s.half_view * s.focal_px[0])
+        motion, variance = _together(coherence_px, VIEW * max(1.0 - left, LEAST_VIEW), w)
+    else:
+        motion, variance = _weighted(w)
     for i in range(N_ERROR):
         w.H[axis, i] = 0.0
         for k in range(COLUMNS):
@@ -115,14 +123,19 @@ def _weighted(w: Record) -> tuple[float, float]:
 
 
 @kernel
-def _together(coherence_px: float, start: float, w: Record) -> tuple[float, float]:
-    """Motion [px] of the columns that move alike and the variance among them; weights of sum 1 into ``w.weight``."""
-    motion, spread = start, 0.0
+def _together(coherence_px: float, kept: float, w: Record) -> tuple[float, float]:
+    """Motion [px] of the columns that move alike and the variance among them; weights of sum 1 into ``w.weight``.
+
+    ``kept`` is the share of the picture that counts, around its middle.
+    """
+    motion, spread = w.column[COLUMNS // 2], 0.0
     for _ in range(ROUNDS):
         total, first, second = 0.0, 0.0, 0.0
         for k in range(COLUMNS):
             apart = w.column[k] - motion
-            w.weight[k] = math.exp(-0.5 * (apart / coherence_px) ** 2) if np.isfinite(apart) else 0.0
+            in_view = 0.5 * (COLUMNS * kept + 1.0 - abs(2.0 * k - (COLUMNS - 1)))  # columns are 2 / COLUMNS wide
+            alike = math.exp(-0.5 * (apart / coherence_px) ** 2) if np.isfinite(apart) else 0.0
+            w.weight[k] = alike * min(max(in_view, 0.0), 1.0)
             if w.weight[k] > 0.0:
                 total += w.weight[k]
                 first += w.weight[k] * apart

@@ -78,6 +78,7 @@ def _sigma(target: str, unit: str, required: bool = False) -> Column:
 _WINDOW = Column("window_s", "window", "s", 1e-6, 10.0)
 _QUALITY = Column("quality", "quality", required=False)
 _SIGMA_DY = Column("sigma_dy_px", "sigma_dy", "px", SMALLEST, LARGEST, required=False)
+_COHERENCE = Column("coherence_px", "coherence", "px", SMALLEST, LARGEST, required=False)
 
 IMU = (
     *_vector("gyro_rad_s", "w_RS_S_*", "rad s^-1", MAX_RATE_RAD_S, "w* w_* gyro_* gyr_* omega_* angular_velocity_*"),
@@ -93,6 +94,7 @@ FLOW = (
     _sigma("sigma_px", "px"),
     _QUALITY,
     _SIGMA_DY,
+    _COHERENCE,
 )
 BLUR = (_WINDOW, Column("length_px", "length", "px", 0.0, 1e5), _sigma("sigma_px", "px", required=True))
 BLUR_SIGNED = (
@@ -102,6 +104,7 @@ BLUR_SIGNED = (
     Column("dy_px", "dy", "px", -1e5, 1e5, required=False),
     _QUALITY,
     _SIGMA_DY,
+    _COHERENCE,
 )
 RANGE = (Column("range_m", "range", "m", 0.0, MAX_LENGTH_M, also=("distance",)), _sigma("sigma_m", "m"))
 UWB_RANGE = (

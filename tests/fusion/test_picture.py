@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from axialnav.fusion.config import Config
-from axialnav.fusion.kernels.picture import SPREAD_SHARE, motion_at_slope, motion_of_picture
+from axialnav.fusion.kernels.picture import SPREAD_SHARE, VIEW, motion_at_slope, motion_of_picture
 from axialnav.fusion.memory import COLUMNS, new_scratch
 from axialnav.fusion.sources import build_sources
 from axialnav.models.rig import Camera, Face, Imu, Surface
@@ -30,7 +30,7 @@ def looking(surface: Surface = WALL, width_px: int = 320):
 
 
 def motion(source, w, window_s: float = 1 / 30, axis: int = 0) -> float:
-    return motion_of_picture(source, window_s, np.int64(axis), w)
+    return motion_of_picture(source, window_s, float(source["coherence_px"]), np.int64(axis), w)
 
 
 def columns(source, w, window_s: float = 1 / 30) -> NDArray[np.float64]:
@@ -45,11 +45,22 @@ def test_past_a_flat_wall_every_column_moves_by_f_v_t_over_z() -> None:
     assert w["variance"][0] == pytest.approx(0.0, abs=1e-20)
 
 
-def test_a_slow_turn_moves_the_picture_by_the_mean_over_its_columns() -> None:
-    """The mean of 1 + a^2 over a view of 90 degrees is 4/3."""
+def test_a_slow_turn_moves_the_picture_by_the_mean_over_what_is_in_view() -> None:
+    """The mean of 1 + a^2 over slopes up to 0.85 of a view of 90 degrees is 1.24."""
     source, w = looking()
     w["rate"][2] = 0.01
-    assert motion(source, w) == pytest.approx(FOCAL_PX * 0.01 / 30 * 4 / 3, rel=0.01)
+    assert motion(source, w) == pytest.approx(FOCAL_PX * 0.01 / 30 * (1 + VIEW**2 / 3), rel=0.01)
+
+
+def test_the_rim_counts_less_the_faster_the_picture_moves() -> None:
+    """What leaves the picture during the window is not in all of its frames: turn and speed, one by one, do not add."""
+    source, w = looking()
+    w["rate"][2] = 0.01
+    turned = motion(source, w)
+    w["x"][3] = 3.0
+    both = motion(source, w)
+    w["rate"][2] = 0.0
+    assert both - motion(source, w) < turned - 0.001
 
 
 def test_a_narrow_picture_and_a_flow_chip_are_compared_with_their_axis() -> None:
@@ -59,7 +70,7 @@ def test_a_narrow_picture_and_a_flow_chip_are_compared_with_their_axis() -> None
     assert motion(source, w) == pytest.approx(centre, rel=1e-4)
     source["half_view"] = 0.0
     assert motion(source, w) == centre
-    assert source["coherence_px"] == pytest.approx(0.6)  # five frames
+    assert source["coherence_px"] == pytest.approx(0.65)  # five frames
 
 
 def test_a_fast_turn_is_read_off_the_columns_that_move_alike_and_trusted_less() -> None:

@@ -105,6 +105,7 @@ def test_any_numbers_read_back_equal(
                 "sigma_px": nothing,
                 "quality": nothing,
                 "sigma_dy_px": nothing,
+                "coherence_px": nothing,
             },
         ),
         "uwb0": SensorTable(
