@@ -88,19 +88,27 @@ def cache_with_stamp(compiled: Any, suffix: str = "") -> None:
 
 
 @numba.extending.intrinsic  # type: ignore[untyped-decorator]
-def addresses_at(typing: Any, address: Any) -> Any:
-    """Inside a kernel: the addresses that stand in memory from the address in a number on."""
-    pointer = numba.types.CPointer(numba.types.voidptr)
+def array_at(typing: Any, address: Any, shape: Any, dtype: Any) -> Any:
+    """Inside a kernel: the contiguous array of this shape and type whose first element stands at an address."""
+    from axialnav.models.pieces import Pieces, piece, product, word
+
+    kind = numba.types.Array(dtype.dtype, len(shape), "C")
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """Read the number as an address."""
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+        """Put the pieces of an array together."""
+        item = context.get_data_type(kind.dtype)
+        strides = [word(context.get_abi_sizeof(item))]
+        lengths = [piece(builder, arguments[1], axis) for axis in range(len(shape))]
+        for length in lengths[:0:-1]:
+            strides.insert(0, product(builder, strides[0], length))
+        data = builder.inttoptr(arguments[0], item.as_pointer())
+        return Pieces(kind, data, tuple(lengths), tuple(strides)).value(context, builder)
 
-    return pointer(numba.types.uintp), lower
+    return kind(address, shape, dtype), lower
 
 
 def native(entry: Callable[[int], int]) -> Callable[[int], int]:
-    """Return a kernel of one number, an address for :func:`addresses_at`, as a function that takes nothing else.
+    """Return a kernel of one number, an address for :func:`array_at`, as a function that takes nothing else.
 
     Calling it costs a tenth of a microsecond, while the compiled function itself looks at the type of every argument,
     which for arrays takes longer than the filter.  The caller keeps alive what the addresses point at.

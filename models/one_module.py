@@ -26,13 +26,17 @@ from collections.abc import Iterator
 from typing import Any
 
 from numba import _dynfunc
-from numba.core import codegen, compiler, errors, funcdesc, typed_passes, typeinfer, types, untyped_passes
+from numba.core import codegen, compiler, errors, funcdesc, typed_passes, typeinfer, types, typing
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.environment import Environment
 from numba.core.errors import NumbaWarning
 
+from axialnav.models.quick_lowering import QuickLower
+from axialnav.models.quick_passes import BEFORE_TYPES, NoPhis
+
 FIRST_WITHOUT_GATHER = 17  # first LLVM that can be told to leave gathers and scatters alone
+TWO_ALIKE = (types.float64,) * 2, (types.int64,) * 2
 Call = tuple[str, str, tuple[Any, ...]]  # module, name and argument types of a kernel that a part calls
 
 
@@ -139,6 +143,8 @@ class _Inference(typeinfer.TypeInferer):  # type: ignore[misc]
         plain = tuple(types.misc.unliteral(a) for a in pos_args)
         if all(isinstance(a, types.Number | types.Boolean) for a in plain[fnty is operator.getitem :]):
             pos_args = plain  # numbers in the source are as good as variables
+            if getattr(fnty, "typing_key", None) in (max, min) and pos_args in TWO_ALIKE:
+                return typing.signature(pos_args[0], *pos_args)  # else numba compiles a function for it
         key = fnty, pos_args
         if key not in self.known:
             self.known[key] = super().resolve_call(fnty, pos_args, kw_args)
@@ -168,7 +174,7 @@ class ScalarTypeInference(typed_passes.BaseTypeInference):  # type: ignore[misc]
 
 def _mangle(name: str, argument_types: tuple[Any, ...], *, abi_tags: Any = (), uid: Any = None) -> str:
     """Symbol of a function, the same in every process; numba puts the number into it that a record has in this one."""
-    described = hashlib.sha256(repr(argument_types).encode()).hexdigest()[:24]
+    described = hashlib.sha256(",".join(map(str, argument_types)).encode()).hexdigest()[:24]
     return str(funcdesc.default_mangler(name, (), abi_tags=(*abi_tags, described), uid=uid))
 
 
@@ -177,6 +183,7 @@ class PartLowering(typed_passes.NativeLowering):  # type: ignore[misc]
     """Lowering of a part: no machine code."""
 
     _name = "part_lowering"
+    lowering_class = QuickLower
 
     def run_pass(self, state: Any) -> bool:
         """Write the kernel's LLVM module and make it callable from other kernels."""
@@ -202,6 +209,7 @@ class WholeLowering(typed_passes.NativeLowering):  # type: ignore[misc]
     """Lowering of a whole."""
 
     _name = "whole_lowering"
+    lowering_class = QuickLower
 
     def run_pass(self, state: Any) -> bool:
         """Write the kernel's LLVM module, link its parts, optimise, emit."""
@@ -240,20 +248,7 @@ class _ScalarCompiler(compiler.CompilerBase):  # type: ignore[misc]
     def define_pipelines(self) -> list[PassManager]:
         """The passes that scalar code needs."""
         passes = PassManager("scalar kernel")
-        for one in (
-            untyped_passes.TranslateByteCode,
-            untyped_passes.FixupArgs,
-            untyped_passes.IRProcessing,
-            untyped_passes.RewriteSemanticConstants,
-            untyped_passes.GenericRewrites,
-            untyped_passes.ReconstructSSA,
-            ScalarTypeInference,
-            typed_passes.PreLowerStripPhis,
-            typed_passes.IRLegalization,
-            typed_passes.AnnotateTypes,
-            self.lowering,
-            typed_passes.NoPythonBackend,
-        ):
+        for one in (*BEFORE_TYPES, ScalarTypeInference, NoPhis, self.lowering, typed_passes.NoPythonBackend):
             passes.add_pass(one, one._name)
         passes.finalize()
         return [passes]

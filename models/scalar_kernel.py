@@ -15,7 +15,7 @@ from axialnav.models.jit import OPTIONS, cache_with_stamp
 
 F = TypeVar("F", bound=Callable[..., object])
 
-TRIED = (0, 61), (0, 68)  # oldest and newest numba whose inside is as expected; others compile as usual, slowly
+TRIED = (0, 62), (0, 68)  # oldest and newest numba whose inside is as expected; others compile as usual, slowly
 
 
 def kernel(function: F) -> F:

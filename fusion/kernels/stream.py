@@ -6,10 +6,7 @@ of stamps.  The same readings in any order of arrival within the ring therefore 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import carray
 from numpy.typing import NDArray
 
 from axialnav.fusion.events import WIDTH
@@ -17,8 +14,7 @@ from axialnav.fusion.kernels.run import run
 from axialnav.fusion.memory import LOG_WIDTH, MEMORY, SCRATCH, SETTINGS, SOURCE_MEMORY, TRACK_WIDTH
 from axialnav.fusion.ring import HEAD, INBOX
 from axialnav.fusion.sources import SOURCE
-from axialnav.models.jit import Record, Records, addresses_at
-from axialnav.models.jit import kernel as array_kernel
+from axialnav.models.jit import Record, Records, array_at
 from axialnav.models.scalar_kernel import kernel
 
 Array = NDArray[np.float64]
@@ -29,27 +25,25 @@ ADDRESSES = (
     "head", "t_ns", "source", "values", "slot", "free", "kept", "live", "core", "memory", "inbox",
     "sources", "scratch", "settings", "out", "track", "sizes",
 )  # fmt: skip
-WORD, REAL = np.dtype(np.int64), np.dtype(np.float64)
+ADDRESS, WORD, REAL = np.dtype(np.uintp), np.dtype(np.int64), np.dtype(np.float64)
 
 
-@array_kernel  # the arrays are made here
+@kernel
 def take_at(address: int) -> int:
     """Run :func:`take` on the arrays whose addresses stand at ``address``, in the order of ``ADDRESSES``.
 
     One address as the only argument: handing over seventeen arrays would cost more than the filter.
     """
-    block: Any = addresses_at(address)
-    (head, t_ns, source, values, slot, free, kept, live, core, memory, inbox, sources, scratch, settings, out, track,
-     sizes) = block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8], block[9], \
-        block[10], block[11], block[12], block[13], block[14], block[15], block[16]  # fmt: skip
-    n, k, words, n_sources = carray(sizes, (4,), WORD)
+    at = array_at(address, (len(ADDRESSES),), ADDRESS)
+    sizes = array_at(at[16], (4,), WORD)
+    n, k, words, n_sources = sizes[0], sizes[1], sizes[2], sizes[3]
     return take(
-        carray(head, (1,), HEAD)[0], carray(t_ns, (n,), WORD), carray(source, (n,), WORD),
-        carray(values, (n, WIDTH), REAL), carray(slot, (n,), WORD), carray(free, (k,), WORD),
-        carray(kept, (k, words), WORD), carray(live, (words,), WORD), carray(core, (1,), MEMORY),
-        carray(memory, (n_sources,), SOURCE_MEMORY), carray(inbox, (1,), INBOX)[0],
-        carray(sources, (n_sources,), SOURCE), carray(scratch, (1,), SCRATCH), carray(settings, (1,), SETTINGS),
-        carray(out, (2, LOG_WIDTH), REAL), carray(track, (1, TRACK_WIDTH), REAL),
+        array_at(at[0], (1,), HEAD)[0], array_at(at[1], (n,), WORD), array_at(at[2], (n,), WORD),
+        array_at(at[3], (n, WIDTH), REAL), array_at(at[4], (n,), WORD), array_at(at[5], (k,), WORD),
+        array_at(at[6], (k, words), WORD), array_at(at[7], (words,), WORD), array_at(at[8], (1,), MEMORY),
+        array_at(at[9], (n_sources,), SOURCE_MEMORY), array_at(at[10], (1,), INBOX)[0],
+        array_at(at[11], (n_sources,), SOURCE), array_at(at[12], (1,), SCRATCH), array_at(at[13], (1,), SETTINGS),
+        array_at(at[14], (2, LOG_WIDTH), REAL), array_at(at[15], (1, TRACK_WIDTH), REAL),
     )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ def copy_of_the_package(folder: Path, decorator: str = DECORATORS[0]) -> Path:
         (package / layer).mkdir(parents=True)
         (package / layer / "__init__.py").touch()
     (package / "__init__.py").touch()
-    for name in ("jit.py", "one_module.py", "scalar_kernel.py"):
+    for name in ("jit.py", "one_module.py", "pieces.py", "quick_lowering.py", "quick_passes.py", "scalar_kernel.py"):
         (package / "models" / name).write_text((root / "models" / name).read_text())
     (package / "models" / "outer.py").write_text(CALLER.format(decorator=decorator))
     return package
