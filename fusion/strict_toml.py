@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec.structs import FieldInfo
 
 from axialnav.fusion.errors import ConfigError
 
 T = TypeVar("T")
 MAX_BYTES = 16 << 20
 _UNKNOWN = re.compile(r"unknown field `(?P<field>[^`]+)`(?: - at `(?P<path>[^`]+)`)?")
+_NO_CHOICE = re.compile(r"Invalid enum value .*, at `[^`]*?(?P<field>\w+)(?:\[[^`]*\])*`")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -85,7 +87,9 @@ def parse(text: str, *, where: str) -> dict[str, Any]:
 def _explain(message: str, kind: type[Any]) -> str:
     found = _UNKNOWN.search(message)
     if not found:
-        return message.replace("$.", "").replace(" - at ", ", at ")
+        plain = message.replace("$.", "").replace(" - at ", ", at ")
+        choice = _NO_CHOICE.search(plain)
+        return f"{plain}; there are {', '.join(_choices(kind, choice['field']))}" if choice else plain
     field = found["field"]
     table = (found["path"] or "$").removeprefix("$").removeprefix(".")
     near = difflib.get_close_matches(field, list(_all_fields(kind)), n=1, cutoff=0.5)
@@ -93,8 +97,26 @@ def _explain(message: str, kind: type[Any]) -> str:
     return f"unknown key `{table + '.' if table else ''}{field}`{hint}"
 
 
+def _choices(kind: type[Any], name: str) -> list[str]:
+    """All words that fields of a name take."""
+    words: dict[str, None] = {}
+    stack = [field.type for field in _fields(kind) if field.encode_name == name]
+    while stack:
+        node = stack.pop(0)
+        if isinstance(node, str):
+            words[node] = None
+        else:
+            stack = [*getattr(node, "__args__", ()), *stack]
+    return list(words)
+
+
 def _all_fields(kind: type[Any]) -> Iterator[str]:
     """Yield every key that can occur anywhere below ``kind``."""
+    return (field.encode_name for field in _fields(kind))
+
+
+def _fields(kind: type[Any]) -> Iterator[FieldInfo]:
+    """Yield every field that can occur anywhere below ``kind``."""
     seen: set[type[Any]] = set()
     stack: list[Any] = [kind]
     while stack:
@@ -104,7 +126,7 @@ def _all_fields(kind: type[Any]) -> Iterator[str]:
                 continue
             seen.add(node)
             for field in msgspec.structs.fields(node):
-                yield field.encode_name
+                yield field
                 stack.append(field.type)
         else:
             stack.extend(getattr(node, "__args__", ()))

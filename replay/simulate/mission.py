@@ -12,6 +12,7 @@ from axialnav.models.rig import NonNegative, Positive, Vector3
 
 Side = Literal["left", "right"]
 Share = Annotated[float, msgspec.Meta(ge=0.0, lt=1.0)]
+UpTo10 = Annotated[float, msgspec.Meta(ge=0.0, le=10.0)]
 UwbCondition = Literal["clean", "corner", "ramp", "step", "spikes", "frozen", "wild", "none"]
 Fault = Literal["tof_misses", "tof_spikes", "accel_runaway", "frame_drops", "uwb_late", "attitude_drift", "baro_doors"]
 ORDINARY_FAULTS: tuple[Fault, ...] = ("tof_misses", "tof_spikes", "attitude_drift", "baro_doors")
@@ -67,14 +68,14 @@ class VehiclePlan(_Table, frozen=True, kw_only=True):
 
     profile: Literal["constant", "stop_and_go", "paper"] = "constant"
     speed_m_s: Positive = 1.0
-    acceleration_m_s2: Positive = 0.8
+    acceleration_m_s2: Annotated[float, msgspec.Meta(gt=0.0, le=50.0)] = 0.8
     still_s: NonNegative = 3.0
     height_m: Positive = 1.5
     offset_m: float = 0.0
     clearance_sigma_m: NonNegative = 0.04
-    yaw_sigma_rad: NonNegative = 0.01
-    drag_per_s: NonNegative = 0.15
-    vibration_m_s2: NonNegative = 0.6
+    yaw_sigma_rad: Annotated[float, msgspec.Meta(ge=0.0, le=0.3)] = 0.01
+    drag_per_s: UpTo10 = 0.15
+    vibration_m_s2: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] = 0.6
 
 
 class CameraPlan(_Table, frozen=True, kw_only=True):
@@ -87,15 +88,15 @@ class CameraPlan(_Table, frozen=True, kw_only=True):
     width_px: Annotated[int, msgspec.Meta(ge=64, le=4096)] = 640
     height_px: Annotated[int, msgspec.Meta(ge=48, le=4096)] = 480
     focal_px: Positive = 320.0
-    focal_error: NonNegative = 0.001
+    focal_error: Annotated[float, msgspec.Meta(ge=0.0, le=0.2)] = 0.001
     rate_hz: Annotated[float, msgspec.Meta(ge=1.0, le=500.0)] = 30.0
     exposure_s: Positive = 0.010
     readout_s: NonNegative = 0.0
     light: Literal["bright", "dim", "dark"] = "bright"
     flicker_hz: Positive = 100.0
     flicker_depth: Share = 0.2
-    pixel_pattern: NonNegative = 0.003
-    column_pattern: NonNegative = 0.001
+    pixel_pattern: Share = 0.003
+    column_pattern: Share = 0.001
     vignette: Share = 0.1
 
 
@@ -104,9 +105,9 @@ class UwbPlan(_Table, frozen=True, kw_only=True):
 
     measurement: Literal["range", "tdoa", "position"] = "range"
     anchors: dict[str, Vector3] = {}
-    rate_hz: Positive = 50.0
-    sigma_m: Positive = 0.10
-    latency_s: NonNegative = 0.02
+    rate_hz: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 50.0
+    sigma_m: Annotated[float, msgspec.Meta(gt=0.0, le=10.0)] = 0.10
+    latency_s: UpTo10 = 0.02
     condition: UwbCondition = "corner"
 
 

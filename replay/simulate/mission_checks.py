@@ -10,6 +10,7 @@ MIN_WIDTH_M, MAX_WIDTH_M = 1.0, 50.0
 MIN_LENGTH_M, MAX_LENGTH_M = 0.5, 5000.0
 CLEARANCE_M = 0.35  # between the vehicle's middle and any wall
 MAX_TURN_DEG = 120.0
+MAX_TIME_S = 36_000.0
 MAX_SHARE_OF_PICTURE = 0.1  # of the width that may pass per frame: five frames then still share half of a picture
 
 
@@ -24,7 +25,21 @@ def check_mission(mission: Mission) -> None:
     for number, plan in enumerate(mission.section, start=1):
         _check_section(f"mission {mission.name}, section {number} ({plan.kind})", plan)
         _check_clearance(mission, number, plan)
+    _check_time(mission)
     _check_camera(mission)
+
+
+def _check_time(mission: Mission) -> None:
+    vehicle = mission.vehicle
+    takes = vehicle.still_s + sum(plan.length_m for plan in mission.section) / vehicle.speed_m_s
+    for what, value, way_out in (
+        ("duration_s", mission.duration_s or 0.0, "shorten it"),
+        ("the way takes", takes, "shorten it, stand still for less or fly faster"),
+    ):
+        if not value <= MAX_TIME_S:
+            raise ConfigError(
+                f"mission {mission.name}: {what} {value:.3g} s, must be at most {MAX_TIME_S:g}; {way_out}"
+            )
 
 
 def _check_section(where: str, plan: SectionPlan) -> None:
@@ -104,3 +119,10 @@ def _check_camera(mission: Mission) -> None:
             f"mission {mission.name}: camera.exposure_s = {camera.exposure_s:g} is longer than the frame period of "
             f"{1.0 / camera.rate_hz:.4g} s; shorten it"
         )
+    if not camera.readout_s <= 1.0 / camera.rate_hz:
+        raise ConfigError(
+            f"mission {mission.name}: camera.readout_s = {camera.readout_s:g} is longer than the frame period of "
+            f"{1.0 / camera.rate_hz:.4g} s; shorten it"
+        )
+    if camera.width_px % 2:
+        raise ConfigError(f"mission {mission.name}: camera.width_px is {camera.width_px}, must be even; add one")

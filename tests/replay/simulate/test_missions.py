@@ -42,6 +42,14 @@ BAD = {
     "too low": (GOOD + "[vehicle]\nheight_m = 0.2\n", "of the floor, must keep"),
     "opening outside": (GOOD.replace("start_m = 5.0", "start_m = 11.5"), "must lie between"),
     "long exposure": (GOOD + "[camera]\nexposure_s = 0.05\n", "longer than the frame period"),
+    "slow readout": (GOOD + "[camera]\nreadout_s = 0.05\n", "longer than the frame period"),
+    "odd width": (GOOD + "[camera]\nwidth_px = 641\n", "must be even"),
+    "days of standing": (GOOD + "[vehicle]\nstill_s = 1e9\n", "must be at most 36000; shorten it"),
+    "creeping": (GOOD + "[vehicle]\nspeed_m_s = 1e-6\n", "fly faster"),
+    "endless": ("duration_s = 1e12\n" + GOOD, "must be at most 36000; shorten it"),
+    "fast radio": (GOOD + "[uwb]\nrate_hz = 1e9\n", "<= 1000.0, at `uwb.rate_hz`"),
+    "no such texture": (GOOD.replace("near_blank", "wood"), "'wood', at .*; there are concrete, plaster, rock"),
+    "no such fault": ('faults = ["fog"]\n' + GOOD, "'fog', at .*; there are tof_misses"),
     "no number": (GOOD.replace("width_m = 4.0", "width_m = nan"), "must be a finite number"),
 }
 
