@@ -75,21 +75,24 @@ class ImuTuning(_Table, frozen=True, kw_only=True):
 
     Vibration and sampling make the noise in flight larger than at rest: ``accel_noise_scale`` and
     ``gyro_noise_scale`` multiply the sensor's densities, ``accel_walk_scale`` and ``gyro_walk_scale`` the walks of its
-    biases.
+    biases.  Of the accelerometer's margin as much is used as the aids show to be needed, within about
+    ``margin_time_s``; 0 uses all of it.
 
     Specific force that is farther than ``jolt_m_s2`` from its mean over a tenth of a second is wrong by as much as it
     is farther, alike over ``jolt_time_s``.  Where it strays by more than ``shaken_m_s2`` as a root mean square over a
-    second, the accelerometer is doubted for a while and its bias may walk: ``shaken_walk`` [s^-3/2] times the stray.
+    second, the accelerometer is doubted for a while and its bias may walk along the axes that stray: ``shaken_walk``
+    [s^-3/2] times the stray.
     """
 
     accel_noise_scale: Positive = 2.0
     gyro_noise_scale: Positive = 1.5
     accel_walk_scale: Positive = 1.0
     gyro_walk_scale: Positive = 1.0
+    margin_time_s: NonNegative = 10.0
     jolt_m_s2: Positive = 3.0
     jolt_time_s: NonNegative = 0.15
     shaken_m_s2: Positive = 1.4
-    shaken_walk: NonNegative = 0.7
+    shaken_walk: NonNegative = 0.8
 
 
 class StartTuning(_Table, frozen=True, kw_only=True):
@@ -189,9 +192,14 @@ class CameraTuning(_Table, frozen=True, kw_only=True):
 
 
 class RangeTuning(_Table, frozen=True, kw_only=True):
-    """Noise of wall and floor ranges."""
+    """Noise of wall and floor ranges.
+
+    Where the sensor states none, ``sigma_m`` is the error of a reading, of which ``white_m`` is new with each; the rest
+    (offset, tilt, what the beam hits) stays for many readings: it opens the gate and tells nothing of the motion.
+    """
 
     sigma_m: Positive = 0.015
+    white_m: Positive = 0.006
     offset_sigma_m: Positive = 1.0
     offset_walk_m: NonNegative = 1e-3  # m s^-1/2
     gate: Gate = Gate(soft_sigma=3.0)

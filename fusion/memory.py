@@ -32,13 +32,13 @@ MEMORY: Final = np.dtype(
         ("x", "f8", (2, N_NOMINAL)),
         ("P", "f8", (2, N_ERROR, N_ERROR)),  # without the block below the core: see whole_covariance
         ("imu", "f8", 6),  # last sample, body axes: rate, specific force
-        # how it is shaken (kernels.shaking): fading mean of the specific force, mean square beside that of a second and
-        # its highest of late, what they add to the noise of acceleration [m^2/s^3] and bias [m^2/s^5]
+        # how it is shaken (kernels.shaking), per axis: fading mean of the specific force, mean square beside that of a
+        # second and its highest of late, what they add to the noise of acceleration [m^2/s^3] and bias [m^2/s^5]
         ("force", "f8", 3),
-        ("shaking", "f8"),
-        ("shaken", "f8"),
+        ("shaking", "f8", 3),
+        ("shaken", "f8", 3),
         ("jolt", "f8", 3),
-        ("shaken_walk", "f8"),
+        ("shaken_walk", "f8", 3),
         ("t_imu", "i8"),
         ("t_aid", "i8"),  # last axial aid of any kind
         ("t_flow", "i8"),  # last pixel motion
@@ -65,6 +65,7 @@ MEMORY: Final = np.dtype(
         ("correction_variance", "f8", 3),  # and the variance expected of it
         ("correction_rate", "f8", 3),  # their fading mean [m/s^2]
         ("correction_rate_variance", "f8", 3),
+        ("margin", "f8", 3),  # share of the accelerometer's variance that is needed, world axes (kernels.margin)
         # the shadow: the vehicle without UWB (kernels.shadow)
         ("shadow_p", "f8", 3),
         ("shadow_v", "f8", 3),
@@ -168,6 +169,7 @@ def new_memory(n_sources: int) -> Memory:
     sources["trust"], sources["scatter"] = 1.0, SCATTER_START_M
     core = np.zeros(1, MEMORY)
     core["path"], core["path_heard"] = -1, LONG_AGO
+    core["margin"] = 1.0
     for stamp in ("t_failed", "t_shadow", "t_motion_blamed", "t_neither"):
         core[stamp] = LONG_AGO
     return Memory(core, sources)
@@ -187,7 +189,7 @@ def new_scratch() -> Records:
 
 SETTINGS_FIELDS: Final = (
     "gravity_m_s2", "axial_x", "axial_y", "axial_z", "gyro_variance", "gyro_walk", "accel_variance", "accel_walk",
-    "accel_white", "jolt_m_s2", "jolt_time_s", "shaken_m_s2", "shaken_walk",
+    "accel_white", "least_margin", "margin_blend", "jolt_m_s2", "jolt_time_s", "shaken_m_s2", "shaken_walk",
     "fault_accel_variance", "fault_accel_walk", "blur_scale_walk", "uwb_bias_time_s", "uwb_bias_length_m",
     "wall_offset_walk", "doubt_m_s2", "doubt_sigmas", "doubt_time_s",
     "trial_s", "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
@@ -240,6 +242,8 @@ def build_settings(config: Config) -> Records:
         "accel_variance": accel,
         "accel_walk": (imu.accel_bias_walk * tune.accel_walk_scale) ** 2,
         "accel_white": 2.0 * imu.accel_noise_density**2,  # three axes, means of two samples, and a third for luck
+        "least_margin": min(1.0, 1.0 / tune.accel_noise_scale**2),
+        "margin_blend": fault.doubt_time_s / tune.margin_time_s if tune.margin_time_s > 0.0 else 0.0,
         "jolt_m_s2": tune.jolt_m_s2,
         "jolt_time_s": tune.jolt_time_s,
         "shaken_m_s2": tune.shaken_m_s2,

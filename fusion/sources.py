@@ -50,6 +50,7 @@ SOURCE = np.dtype(
         ("kind", "i8"),
         ("enabled", "?"),
         ("sigma", "f8"),
+        ("white_share", "f8"),  # of the variance of a reading that states none; the rest is alike from one to the next
         ("bias_variance", "f8"),  # of a UWB path [m^2]
         ("correlation_s", "f8"),  # over which errors are alike, 0: not at all
         ("first_path", "i8"),  # number of its anchor 0 among the paths of all sources
@@ -141,6 +142,7 @@ def _row(name: str, spec: AnySensor, config: Config) -> dict[str, Any]:
         "kind": int(kind),
         "enabled": name not in config.disabled,
         "sigma": sigma,
+        "white_share": _white_share(spec, config),
         "bias_variance": _bias_sigma(spec, config) ** 2,
         "correlation_s": correlation_s(spec, config),
         "gate": [chi_square_threshold(dof, gate.probability) for dof in (1, 2, 3)],
@@ -212,6 +214,11 @@ def correlation_s(spec: AnySensor, config: Config) -> float:
 def counts_as_fewer(spec: AnySensor, config: Config) -> bool:
     """Whether neighbouring readings of a sensor err alike and no bias state takes that up."""
     return correlation_s(spec, config) > 0.0 and _bias_sigma(spec, config) == 0.0
+
+
+def _white_share(spec: AnySensor, config: Config) -> float:
+    told = not isinstance(spec, RangeFinder) or spec.sigma_m is not None
+    return 1.0 if told else min(1.0, (config.range.white_m / config.range.sigma_m) ** 2)
 
 
 def _bias_sigma(spec: AnySensor, config: Config) -> float:

@@ -98,7 +98,10 @@ def _measure_range(s: Record, values: Array, x: Array, w: Record) -> int:
     if not look_at_surface(s, x, 0.0, w):
         return -NO_GEOMETRY
     w.h[0] = wall_range(w.p, w.R, s.R_BS, s.lever_B, w.normal, w.plane[0], s.offset_is_state, w.H[0], w.ray)
-    w.variance[0] = variance_of(values[1], s.sigma) + w.plane[1] ** 2
+    rough = w.plane[1] ** 2
+    w.variance[0] = variance_of(values[1], s.sigma) + rough
+    if not values[1] > s.sigma:
+        w.repeated = (s.white_share * s.sigma**2 + rough) / w.variance[0]
     return 1 if np.isfinite(w.h[0]) else -NO_GEOMETRY
 
 

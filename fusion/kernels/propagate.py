@@ -54,7 +54,7 @@ def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: 
     decay = bias_decay(m.x[row], dt, c)
     strapdown(m.x[row], w.mean_imu[0:3], w.mean_imu[3:6], dt, c.gravity_m_s2, w.R, w.F)
     accel = c.fault_accel_variance if fault else c.accel_variance
-    accel_walk = (c.fault_accel_walk if fault else c.accel_walk) + m.shaken_walk
+    accel_walk = c.fault_accel_walk if fault else c.accel_walk
     gyro = c.gyro_variance
     unseen = 0.0
     if dt > MAX_IMU_GAP_S:
@@ -67,10 +67,10 @@ def propagate_filter(row: int, fault: bool, dt: float, m: Record, w: Record, c: 
         jolt = 0.0
         for k in range(3):
             jolt += w.R[i, k] * w.R[i, k] * m.jolt[k]
-        w.Q[E_VEL + i] = (accel + jolt) * dt
+        w.Q[E_VEL + i] = (accel * (1.0 if fault else m.margin[i]) + jolt) * dt
         w.Q[E_ATT + i] = gyro * dt
         w.Q[E_GYRO_BIAS + i] = c.gyro_walk * dt
-        w.Q[E_ACCEL_BIAS + i] = accel_walk * dt
+        w.Q[E_ACCEL_BIAS + i] = (accel_walk + m.shaken_walk[i]) * dt
     w.Q[E_BLUR_SCALE] = c.blur_scale_walk * dt
     for k in range(N_BIASES):
         w.Q[E_UWB_BIAS + k] = m.path_variance[k] * (1.0 - decay * decay)

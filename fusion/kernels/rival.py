@@ -15,6 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.fusion.kernels.margin import note_moves
 from axialnav.models.jit import Record
 from axialnav.models.scalar_kernel import kernel
 from axialnav.models.state import N_ERROR, N_NOMINAL
@@ -35,13 +36,17 @@ def in_doubt(dt: float, m: Record, c: Record) -> bool:
     for i in range(3):
         rate = m.correction_rate[i] * decay + m.correction[i] / c.doubt_time_s
         variance = m.correction_rate_variance[i] * decay * decay
-        variance += m.correction_variance[i] / (c.doubt_time_s * c.doubt_time_s)
+        fresh = m.correction_variance[i] / (c.doubt_time_s * c.doubt_time_s)
+        variance += fresh
         m.correction_rate[i] = rate
         m.correction_rate_variance[i] = variance
         m.correction[i] = 0.0
         m.correction_variance[i] = 0.0
         size2 += rate * rate
-        sigmas2 += rate * rate / variance if variance > 0.0 else 0.0
+        if variance > 0.0:
+            moved = rate * rate / variance
+            sigmas2 += moved
+            note_moves(i, moved, fresh / variance, m, c)
     return bool(size2 > c.doubt_m_s2 * c.doubt_m_s2 and sigmas2 > c.doubt_sigmas * c.doubt_sigmas)
 
 

@@ -65,7 +65,7 @@ def close_block(t_ns: int, sources: Records, memory: Records, m: Record, w: Reco
     draw_shadow(m, w, c)
     aided = (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S and not in_doubt(m)
     m.torn = m.torn + 1 if aided and is_torn(t_ns, m, w, c) else 0
-    uwb_ok = False
+    uwb_ok, doubted = False, False
     for i in range(sources.shape[0]):
         s, seen = sources[i], memory[i]
         if s.kind == 0 or seen.state == OFF:
@@ -83,10 +83,13 @@ def close_block(t_ns: int, sources: Records, memory: Records, m: Record, w: Reco
             alone = not _another_aids(i, t_ns, sources, memory)
             _judge_uwb(t_ns, aided, alone, s, seen, m, w, c)
             uwb_ok = uwb_ok or (seen.state == OK and (t_ns - seen.t_fused) * 1e-9 < FUSED_S)
+            doubted = doubted or seen.state == SUSPECT or seen.state == REACQUIRE
     for i in range(sources.shape[0]):
         seen = memory[i]
         if FLOW <= sources[i].kind <= BLUR and seen.state >= OK and seen.state != LOST:
             _judge_motion(t_ns, uwb_ok, seen, m, c)
+            if doubted and not uwb_ok and seen.trust < REFUSED_TRUST:
+                m.t_neither = t_ns  # inertia, which carries the filter, contradicts both
         elif not is_uwb(sources[i].kind) and seen.state == REACQUIRE:
             seen.state = OK
 

@@ -34,10 +34,11 @@ class Subject:
 
 
 def undecided(config: Config) -> Config:
-    """Copy with full weight inside every gate, and without the supervisor.
+    """Copy with full weight inside every gate, all of the accelerometer's margin, and without the supervisor.
 
     The redescending weight makes the filter take less from each reading than its noise allows; likelihood would then
-    call the accelerometer noisier than it is, to make up for that.  The supervisor decides about a whole source for
+    call the accelerometer noisier than it is, to make up for that.  A margin that follows the flight would make the
+    likelihood flat in the accelerometer's noise.  The supervisor decides about a whole source for
     seconds, and a small change of a setting can bring such a decision about: the cost would jump by hundreds there, and
     a source with wrong stamps would be judged by the few readings that the supervisor lets pass.
     """
@@ -46,7 +47,9 @@ def undecided(config: Config) -> Config:
         name: msgspec.structs.replace(table, gate=Gate(probability=table.gate.probability, soft_sigma=NO_WEIGHT))
         for name, table in tables.items()
     }
-    return msgspec.structs.replace(config, **hard, supervisor=msgspec.structs.replace(config.supervisor, enabled=False))
+    replace = msgspec.structs.replace
+    alone, told = replace(config.supervisor, enabled=False), replace(config.imu, margin_time_s=0.0)
+    return replace(config, **hard, supervisor=alone, imu=told)
 
 
 class Cost:

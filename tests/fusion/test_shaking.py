@@ -104,7 +104,19 @@ def test_noise_that_the_data_sheet_states_is_no_shaking(density: float) -> None:
     shaken_for, jolts = 0, 0.0
     for before, sample in pairwise(samples):
         note_shaking(dt, 0.5 * (before + sample), scratch, core, settings)
-        shaken_for += core["shaken_walk"] > 0.0
+        shaken_for += core["shaken_walk"].any()
         jolts += core["jolt"].sum() * dt
     assert shaken_for == 0
     assert jolts / 60.0 < 0.3 * density**2  # nearly all of it is the noise that is told
+
+
+def test_only_the_axes_that_are_shaken_lose_their_bias() -> None:
+    settings = build_settings(fly(Scene(duration_s=2.0, sensors=())).config)[0]
+    core, dt, scratch, rng = new_memory(1).core[0], 0.005, np.zeros(3), np.random.default_rng(8)
+    core["force"] = (0.0, 0.0, 9.81)
+    for _ in range(2000):
+        note_shaking(dt, rng.normal((0.0, 0.0, 9.81), (3.0, 0.3, 0.0)), scratch, core, settings)
+    along, across, none = core["shaken_walk"].tolist()
+    assert along > 1.0
+    assert 0.0 < across < 0.03 * along  # a hundredth of the mean square
+    assert none == 0.0
