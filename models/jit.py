@@ -54,7 +54,8 @@ class _PackageCacheFile(IndexDataCacheFile):  # type: ignore[misc]
         numba numbers the files in the order in which they come and writes the index first, so that two processes that
         start together take the same number for different overloads.
         """
-        number = hashlib.sha256(repr(key).encode()).digest()[:8]
+        types, *rest = key
+        number = hashlib.sha256(f"{','.join(map(str, types))} {rest!r}".encode()).digest()[:8]
         name = self._data_name(int.from_bytes(number))
         self._save_data(name, (self._source_stamp, data))
         self._save_index({**self._load_index(), key: name})

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from axialnav.fusion.memory import TRACK_POS_CROSS, TRACK_STATE, TRACK_VARIANCE, TRACK_VEL_CROSS
 from axialnav.models.jit import Record, Records
 from axialnav.models.rotations import rotate_in_body
-from axialnav.models.scalar_kernel import kernel
+from axialnav.models.scalar_kernel import apart_kernel, kernel
 from axialnav.models.state import E_ATT, E_POS, E_UWB_BIAS, E_VEL, N_BIASES, N_ERROR, N_NOMINAL, QUAT
 from axialnav.models.tangent import inverse_right_jacobian, right_jacobian, rotation_between
 
@@ -62,6 +62,7 @@ WORK: Final = np.dtype(
         ("back", "f8", N_ERROR),
         ("scale", "f8", N_ERROR),
         ("inverse", "f8", N_ERROR),
+        ("row", "f8", N_ERROR),
         ("J", "f8", (3, 3)),
         ("r", "f8", 3),
     ],
@@ -101,14 +102,14 @@ def _step_back(x_before: Array, P_before: Array, x_after: Array, P_after: Array,
     for i in range(N):
         for j in range(N):
             w.D[i, j] -= P_after[i, j]
-    factorise(P_after, w.scale, w.inverse, w.U)
-    solve(w.U, w.scale, w.inverse, w.X)
+    factorise(P_after, w.scale, w.inverse, w.U, w.row)
+    solve(w.U, w.scale, w.inverse, w.X, w.row)
     for i in range(N):
         w.back[i] = 0.0
     for k in range(N):
         for i in range(N):
             w.back[i] += w.X[k, i] * w.delta[k]
-    _add_quadratic(P_before, w.X, w.D, w.T, w.P)
+    _add_quadratic(P_before, w.X, w.D, w.T, w.P, w.row)
     _add(x_before, w.back, w.x)
     for k in range(3):
         w.r[k] = w.back[E_ATT + k]
@@ -119,7 +120,7 @@ def _step_back(x_before: Array, P_before: Array, x_after: Array, P_after: Array,
             w.P[i, j] = w.T[i, j]
 
 
-@kernel
+@apart_kernel
 def transition_times(P: Array, F: Array, dt: float, decay: float, out: Array) -> None:
     """Write ``Phi P`` (25, 25) into ``out``; the blocks are those of :func:`axialnav.models.imu.strapdown`."""
     for j in range(N):
@@ -154,7 +155,7 @@ def _forget(P: Array, position: bool, new: Array, out: Array) -> None:
                 out[E_UWB_BIAS + k, j] = 0.0
 
 
-@kernel
+@apart_kernel
 def carry(P: Array, J: Array, out: Array) -> None:
     """Write ``P`` with its attitude rows and columns multiplied by ``J`` (3, 3) into ``out``."""
     for i in range(N):
@@ -172,80 +173,85 @@ def carry(P: Array, J: Array, out: Array) -> None:
             out[6 + i, 6 + j] = out[6 + j, 6 + i]
 
 
-@kernel
-def factorise(P: Array, scale: Array, inverse: Array, U: Array) -> None:
+@apart_kernel
+def factorise(P: Array, scale: Array, inverse: Array, U: Array, row: Array) -> None:
     """Cholesky factor of the correlation matrix of ``P`` (25, 25): ``U' U``, upper triangle of ``U``.
 
     ``scale`` (25,) gets 1 / sigma and ``inverse`` (25,) one over the pivots.  Directions without uncertainty of their
-    own get pivots of zero, so that a semi-definite ``P`` does no harm.  Rows are updated, not entries: adding vectors
-    is faster than adding up products.
+    own get pivots of zero, so that a semi-definite ``P`` does no harm.  ``row`` (25,) is scratch.
+
+    Here and below a row takes all that it is made of before the next, whole even where half of it would do: rows of
+    one length stay in registers meanwhile.
     """
     for i in range(N):
         scale[i] = 1.0 / math.sqrt(P[i, i]) if P[i, i] > 0.0 else 0.0
     for i in range(N):
         f = scale[i]
-        for j in range(i, N):
-            U[i, j] = f * scale[j] * P[i, j]
-    for i in range(N):
-        pivot = U[i, i]
+        for j in range(N):
+            row[j] = f * scale[j] * P[i, j]
+        for k in range(i):
+            g = U[k, i]
+            for j in range(N):
+                row[j] -= g * U[k, j]
+        pivot = row[i]
         f = 1.0 / math.sqrt(pivot) if pivot > MIN_PIVOT else 0.0
         inverse[i] = f
-        for j in range(i, N):
-            U[i, j] *= f
-        for k in range(i + 1, N):
-            g = U[i, k]
-            for j in range(k, N):
-                U[k, j] -= g * U[i, j]
+        for j in range(N):
+            U[i, j] = row[j] * f
 
 
-@kernel
-def solve(U: Array, scale: Array, inverse: Array, X: Array) -> None:
-    """Solve ``P Y = X`` (25, 25) in place with what :func:`factorise` wrote."""
+@apart_kernel
+def solve(U: Array, scale: Array, inverse: Array, X: Array, row: Array) -> None:
+    """Solve ``P Y = X`` (25, 25) in place with what :func:`factorise` wrote; ``row`` (25,) is scratch."""
     for i in range(N):
         f = scale[i]
         for j in range(N):
-            X[i, j] *= f
-    for i in range(N):
+            row[j] = X[i, j] * f
+        for k in range(i):
+            f = U[k, i]
+            for j in range(N):
+                row[j] -= f * X[k, j]
         f = inverse[i]
         for j in range(N):
-            X[i, j] *= f
-        for k in range(i + 1, N):
-            f = U[i, k]
-            for j in range(N):
-                X[k, j] -= f * X[i, j]
+            X[i, j] = row[j] * f
     for i in range(N - 1, -1, -1):
+        for j in range(N):
+            row[j] = X[i, j]
         for k in range(i + 1, N):
             f = U[i, k]
             for j in range(N):
-                X[i, j] -= f * X[k, j]
+                row[j] -= f * X[k, j]
         f = inverse[i]
         for j in range(N):
-            X[i, j] *= f
+            X[i, j] = row[j] * f
     for i in range(N):
         f = scale[i]
         for j in range(N):
             X[i, j] *= f
 
 
-@kernel
-def _add_quadratic(P: Array, X: Array, D: Array, T: Array, out: Array) -> None:
-    """Write ``P + X' D X`` into ``out``, both triangles of it the same; ``T`` is scratch."""
+@apart_kernel
+def _add_quadratic(P: Array, X: Array, D: Array, T: Array, out: Array, row: Array) -> None:
+    """Write ``P + X' D X`` into ``out``, both triangles of it the same; ``T`` and ``row`` (25,) are scratch."""
     for i in range(N):
         for j in range(N):
-            T[i, j] = 0.0
-            out[i, j] = P[i, j]
+            row[j] = 0.0
         for k in range(N):
             f = D[i, k]
             for j in range(N):
-                T[i, j] += f * X[k, j]
-    for k in range(N):
-        for i in range(N):
-            f = X[k, i]
-            for j in range(i, N):
-                out[i, j] += f * T[k, j]
+                row[j] += f * X[k, j]
+        for j in range(N):
+            T[i, j] = row[j]
     for i in range(N):
-        for j in range(i):
-            out[i, j] = out[j, i]
+        for j in range(N):
+            row[j] = P[i, j]
+        for k in range(N):
+            f = X[k, i]
+            for j in range(N):
+                row[j] += f * T[k, j]
+        for j in range(i, N):
+            out[i, j] = row[j]
+            out[j, i] = row[j]
 
 
 @kernel

@@ -72,15 +72,15 @@ def test_the_solver_is_the_inverse_of_badly_scaled_covariances() -> None:
     rng = np.random.default_rng(4)
     for _ in range(50):
         P, X = random_covariance(rng), rng.normal(size=(N, N))
-        Y, U, scale, inverse = X.copy(), np.zeros((N, N)), np.empty(N), np.empty(N)
-        factorise(P, scale, inverse, U)
-        solve(U, scale, inverse, Y)
+        Y, U, (scale, inverse, row) = X.copy(), np.zeros((N, N)), np.empty((3, N))
+        factorise(P, scale, inverse, U, row)
+        solve(U, scale, inverse, Y, row)
         np.testing.assert_allclose(P @ Y, X, atol=1e-8 * np.abs(X).max())
 
 
 def test_a_quantity_known_exactly_is_left_alone() -> None:
     P = np.diag(np.r_[1.0, 0.0, np.ones(N - 2)])
-    X, U, scale, inverse = np.eye(N), np.zeros((N, N)), np.empty(N), np.empty(N)
-    factorise(P, scale, inverse, U)
-    solve(U, scale, inverse, X)
+    X, U, (scale, inverse, row) = np.eye(N), np.zeros((N, N)), np.empty((3, N))
+    factorise(P, scale, inverse, U, row)
+    solve(U, scale, inverse, X, row)
     np.testing.assert_array_equal(X, P)
