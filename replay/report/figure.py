@@ -17,7 +17,9 @@ Trace = dict[str, Any]
 
 BLUE, ORANGE, GREEN, RED = "#3b82d6", "#e0851b", "#2fa36b", "#dc4b4b"
 PURPLE, GREY = "#9a6bd8", "#8b929c"
+TEAL, BROWN = "#1fa5b5", "#a3713f"
 AXIS_COLOURS = (BLUE, ORANGE, GREEN)
+SENSOR_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, RED, TEAL, BROWN, GREY)
 MAX_BAND_STRETCHES = 40
 MAX_BAND_POINTS = 1000
 TIME = "time after the first IMU sample [s]"

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.outcome import InnovationLog
-from axialnav.replay.report.figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, Figure, Trace, numbers
+from axialnav.replay.report.figure import GREY, SENSOR_COLOURS, Figure, Trace, numbers
 
 Array = NDArray[np.float64]
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE, RED)
 BINS = 30
 TOP = {1: 15.0, 2: 18.0, 3: 21.0}  # one in ten thousand honest readings lies above
 MIN_READINGS = 30
@@ -22,8 +21,13 @@ def nis_histograms(log: InnovationLog) -> list[Figure]:
     for dof in (1, 2, 3):
         found = {name: nis for k, name in enumerate(log.sensors) if (nis := _nis(log, k, dof)).size >= MIN_READINGS}
         if found:
-            figures.append(_figure(found, dof))
+            figures.append(_figure(found, sensor_colours(log), dof))
     return figures
+
+
+def sensor_colours(log: InnovationLog) -> dict[str, str]:
+    """One colour per sensor, the same in all figures."""
+    return dict(zip(log.sensors, SENSOR_COLOURS * len(log.sensors), strict=False))
 
 
 def _nis(log: InnovationLog, source: int, dof: int) -> Array:
@@ -31,12 +35,12 @@ def _nis(log: InnovationLog, source: int, dof: int) -> Array:
     return values[np.isfinite(values)]
 
 
-def _figure(found: dict[str, Array], dof: int) -> Figure:
+def _figure(found: dict[str, Array], colours: dict[str, str], dof: int) -> Figure:
     edges = np.linspace(0.0, TOP[dof], BINS + 1)
     traces = [_steps(edges, chi_square_shares(edges, dof), "chi-square", GREY, dash="dot")]
-    for (name, nis), colour in zip(found.items(), COLOURS * 4, strict=False):
+    for name, nis in found.items():
         shares = np.histogram(np.minimum(nis, edges[-1]), edges)[0] / nis.size
-        traces.append(_steps(edges, shares, f"{name} ({nis.size})", colour))
+        traces.append(_steps(edges, shares, f"{name} ({nis.size})", colours[name]))
     caption = (
         f"Share of the readings with {dof} ax{'is' if dof == 1 else 'es'} in each bin, fused and gated, logarithmic; "
         "the last bin holds all beyond. Above the dotted law on the right: outliers, or noise told too small. "

@@ -72,8 +72,9 @@ def _velocity(run: Run, motion: RigidMotion) -> Figure:
         true_seconds = (truth.t_ns - track.t_ns[0]) * 1e-9
         traces.append(line(true_seconds, along(frame.axis, truth.velocity_m_s), "truth", ORANGE, dash="dot"))
     # a wide band at the start must not flatten the flight
-    room = 0.5 + 1.5 * float(np.nanpercentile(np.abs(np.append(velocity, 0.0)), 99.5))
-    layout = {"yaxis": {"range": [-room, room]}, **section_marks(run, motion)}
+    low, high = np.nanpercentile(np.append(velocity, 0.0), (0.5, 99.5)).tolist()
+    room = 0.3 + 0.4 * (high - low)
+    layout = {"yaxis": {"range": [low - room, high + room]}, **section_marks(run, motion)}
     caption = CAPTION + IMAGE_CAPTION * bool(image)
     return Figure(traces, "axial velocity [m/s]", caption, height_px=400, layout=layout)
 

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.fusion.outcome import Verdict
-from axialnav.replay.report.figure import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, Figure, numbers
-from axialnav.replay.report.nis import nis_histograms
+from axialnav.replay.report.figure import GREY, Figure, numbers
+from axialnav.replay.report.nis import nis_histograms, sensor_colours
 from axialnav.replay.report.section import Section
 from axialnav.replay.run import Run
 from axialnav.replay.series import autocorrelation
 
 Array = NDArray[np.float64]
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE, RED)
 EDGES = np.linspace(-4.0, 4.0, 41)
 LAGS = 25
 MIN_READINGS = 30
@@ -32,7 +31,8 @@ def build(run: Run) -> Section | None:
         "NIS is the squared innovation over its predicted variance, all axes together. The lower two plots take the "
         "fused innovations of each sensor's first axis."
     )
-    figures = [*nis_histograms(run.log), _distribution(fused), _memory(fused)]
+    colours = sensor_colours(run.log)
+    figures = [*nis_histograms(run.log), _distribution(fused, colours), _memory(fused, colours)]
     return Section("Are the innovations honest?", figures, note=note)
 
 
@@ -45,25 +45,25 @@ def _normalised(run: Run, name: str) -> Array:
     return values if values.size >= MIN_READINGS and np.ptp(values) > 0.0 else values[:0]
 
 
-def _distribution(fused: dict[str, Array]) -> Figure:
+def _distribution(fused: dict[str, Array], colours: dict[str, str]) -> Figure:
     middle = 0.5 * (EDGES[1:] + EDGES[:-1])
     honest = np.exp(-0.5 * middle**2) / math.sqrt(2.0 * math.pi)
     traces = [_line(middle, honest, "honest", GREY, dash="dot", shape="linear")]
-    for (name, values), colour in zip(fused.items(), COLOURS * 4, strict=False):
+    for name, values in fused.items():
         density = np.histogram(values, EDGES)[0] / (values.size * (EDGES[1] - EDGES[0]))
-        traces.append(_line(middle, density, name, colour, shape="hvh"))
+        traces.append(_line(middle, density, name, colours[name], shape="hvh"))
     caption = "Narrower than the dotted curve: noise told too large. Wider: told too small."
     return Figure(
         traces, "density", caption, x_title="innovation [sigma]", layout={"yaxis": {"range": [0.0, HIGHEST_DENSITY]}}
     )
 
 
-def _memory(fused: dict[str, Array]) -> Figure:
+def _memory(fused: dict[str, Array], colours: dict[str, str]) -> Figure:
     lags = np.arange(1, LAGS + 1, dtype=np.float64)
     traces = []
-    for (name, values), colour in zip(fused.items(), COLOURS * 4, strict=False):
+    for name, values in fused.items():
         found = autocorrelation(values)[1 : LAGS + 1]
-        traces.append(_line(lags[: found.size], found, name, colour, shape="linear", mode="lines+markers"))
+        traces.append(_line(lags[: found.size], found, name, colours[name], shape="linear", mode="lines+markers"))
     fewest = min(values.size for values in fused.values())
     caption = (
         "Correlation of innovations with those that many readings later. White noise stays near 0: within "

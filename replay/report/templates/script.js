@@ -14,6 +14,14 @@ function room(figure) {
   return BAR_PX + LEGEND_ROW_PX * Math.max(0, Math.ceil(entries / 3) - 1);
 }
 
+// Names of corridor sections that would be written over each other on a narrow screen are left out.
+function spaced(names) {
+  if (!narrow.matches || !names || names.length < 2) return names;
+  const apart = 0.3 * (names[names.length - 1].x - names[0].x);
+  let last = -Infinity;
+  return names.filter((name) => name.x - last >= apart && ((last = name.x), true));
+}
+
 function themed(layout, extra) {
   const style = getComputedStyle(document.documentElement);
   const ink = style.getPropertyValue("--ink").trim();
@@ -22,6 +30,7 @@ function themed(layout, extra) {
   const axis = { gridcolor: rule, zerolinecolor: rule, linecolor: rule, automargin: true };
   return {
     ...layout,
+    annotations: spaced(layout.annotations),
     xaxis: { ...axis, ...layout.xaxis },
     yaxis: { ...axis, ...layout.yaxis },
     font: { family: "system-ui, sans-serif", color: ink, size: narrow.matches ? 11 : 13 },
