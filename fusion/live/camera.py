@@ -48,15 +48,20 @@ class Grabber:
             for picture in self._source.pictures():
                 if stop.is_set():
                     return
+                self.take(picture)
                 if picture is None:
-                    self.counts["unread"] += 1
                     stop.wait(READ_PAUSE_S)
-                elif self._is_next(picture.t_ns):
-                    self.counts["pictures"] += 1
-                    self.mailbox.put(picture)
         finally:
             self.ended = True
             self._source.close()
+
+    def take(self, picture: Picture | None) -> None:
+        """Keep a picture, or count that there was none."""
+        if picture is None:
+            self.counts["unread"] += 1
+        elif self._is_next(picture.t_ns):
+            self.counts["pictures"] += 1
+            self.mailbox.put(picture)
 
     @property
     def reconnected(self) -> int:

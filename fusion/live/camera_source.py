@@ -120,8 +120,11 @@ class V4l2Source:
         if camera.fourcc is not None:
             code = cv2.VideoWriter.fourcc(*camera.fourcc)
             self._set("pixel format", cv2.CAP_PROP_FOURCC, code, must=False)
-        self._set("width", cv2.CAP_PROP_FRAME_WIDTH, spec.resolution[0], must=True)
-        self._set("height", cv2.CAP_PROP_FRAME_HEIGHT, spec.resolution[1], must=True)
+        width, height = spec.resolution
+        taken = [self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)]  # takes effect with the height, not before
+        taken.append(self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height))
+        self._compare("width", cv2.CAP_PROP_FRAME_WIDTH, width, taken=all(taken), must=True)
+        self._compare("height", cv2.CAP_PROP_FRAME_HEIGHT, height, taken=all(taken), must=True)
         if spec.rate_hz:
             self._set("rate [Hz]", cv2.CAP_PROP_FPS, spec.rate_hz, must=False)
         self._set("buffers", cv2.CAP_PROP_BUFFERSIZE, 2, must=False)
@@ -136,7 +139,10 @@ class V4l2Source:
         self._exposure_s = got * EXPOSURE_UNIT_S
 
     def _set(self, name: str, key: int, wanted: float, *, must: bool, tolerance: float = 0.0) -> float:
-        taken = bool(self._capture.set(key, wanted))
+        return self._compare(name, key, wanted, taken=self._capture.set(key, wanted), must=must, tolerance=tolerance)
+
+    def _compare(self, name: str, key: int, wanted: float, *, taken: bool, must: bool, tolerance: float = 0.0) -> float:
+        """What the driver says it is set to."""
         got = float(self._capture.get(key))
         good = taken and abs(got - wanted) <= tolerance * abs(wanted) + 1e-6
         self.settings.append(Setting(name, f"{wanted:g}", f"{got:g}", good))

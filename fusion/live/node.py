@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from axialnav.fusion.live.autopilot import Autopilot
@@ -29,6 +30,8 @@ from axialnav.fusion.readings import PixelMotion, Reading
 CAPACITY = 64  # motions: two seconds
 AT_ONCE = 16
 TICK_S = 0.02
+WORD_NS = 500_000_000
+THREAD_CLOCK = 6  # Linux: processor time of a thread by its number; by its handle would crash where it has just ended
 JOIN_S = 2.0
 
 
@@ -72,6 +75,11 @@ class Node:
     recording
         Records the flight; None: nothing is recorded.
 
+    Attributes
+    ----------
+    wires, output, grabber, motion
+        What the threads run, for who turns the node by hand on a clock of his own (with :meth:`tick`).
+
     Raises
     ------
     ConfigError
@@ -95,6 +103,9 @@ class Node:
         self._vehicle, self._clock, self._say, self._recording = vehicle, clock, say, recording
         self._queue: BoundedQueue[Seen] = BoundedQueue(CAPACITY)
         self._threads: list[threading.Thread] = []
+        self._spent_s: dict[str, float] = {}  # processor time of threads that have ended
+        self._next_line_ns: int | None = None
+        self._next_word_ns = 0
         self._sentence = ""
         self._receiver = Receiver(vehicle.mavlink.allow, key=key)
         self._link = link or open_link(vehicle.mavlink.link)
@@ -111,29 +122,29 @@ class Node:
         self.output = Output(vehicle, self.core.snapshot, self._sender.send, clock, self.autopilot.check, tell)
         hear = recording.heard if recording else None
         self._lines = [NooploopStage(line, self._deliver, clock, hear) for line in vehicle.nooploop]
-        self._grabber: Grabber | None = None
-        self._motion: MotionStage | None = None
+        self.grabber: Grabber | None = None
+        self.motion: MotionStage | None = None
         if vehicle.camera is not None and source is not None:
             self._add_camera(vehicle.camera.sensor, source)
-        self._wires = Wires([MavlinkWire(self._link, self._receive), *self._lines], self._take_motions)
+        self.wires = Wires([MavlinkWire(self._link, self._receive), *self._lines], self._take_motions)
         self._server = StatusServer(vehicle.status.port, self.status) if vehicle.status.port else None
 
     def _add_camera(self, sensor: str, source: Source) -> None:
         config = self._vehicle.filter
-        self._grabber = Grabber(source, config.sensor[sensor].rate_hz)
+        self.grabber = Grabber(source, config.sensor[sensor].rate_hz)
         see, miss = self._recording.frame if self._recording else None, self.output.frame_done
-        self._motion = MotionStage(config, sensor, self._grabber.mailbox, self._deliver_motion, self._clock, see, miss)
+        self.motion = MotionStage(config, sensor, self.grabber.mailbox, self._deliver_motion, self._clock, see, miss)
 
     def start(self) -> None:
         """Start every thread."""
         bodies: dict[str, Callable[[threading.Event], None]] = {
-            "wires": self._wires.run,
-            "plugs": self._wires.keep_open,
+            "wires": self.wires.run,
+            "plugs": self.wires.keep_open,
             "output": self.output.run,
-            "tick": self._tick,
+            "tick": self._keep_ticking,
         }
-        if self._grabber is not None and self._motion is not None:
-            bodies |= {"camera": self._grabber.run, "motion": self._motion.run}
+        if self.grabber is not None and self.motion is not None:
+            bodies |= {"camera": self.grabber.run, "motion": self.motion.run}
         if self._server is not None:
             bodies["status"] = self._server.run
         for name, body in bodies.items():
@@ -225,20 +236,24 @@ class Node:
         }
 
     def _camera_status(self) -> dict[str, Any] | None:
-        if self._grabber is None or self._motion is None:
+        grabber, motion = self.grabber, self.motion
+        if grabber is None or motion is None:
             return None
-        counts = dict.fromkeys((*Grabber.COUNTED, *MotionStage.COUNTED), 0) | self._grabber.counts
-        counts |= {**self._motion.counts, "overwritten": self._grabber.mailbox.dropped}
-        grabber = self._grabber
+        counts = dict.fromkeys((*Grabber.COUNTED, *MotionStage.COUNTED), 0) | grabber.counts
+        counts |= {**motion.counts, "overwritten": grabber.mailbox.dropped, "waiting": len(grabber.mailbox)}
         return {**counts, "rate_hz": grabber.rate_hz, "reconnected": grabber.reconnected, "ended": grabber.ended}
 
     def _processor_s(self) -> dict[str, float]:
         """Processor time of each thread so far [s]."""
-        alive = [thread for thread in self._threads if thread.is_alive() and thread.ident is not None]
-        return {t.name: round(time.clock_gettime(time.pthread_getcpuclockid(t.ident or 0)), 3) for t in alive}
+        spent = dict(self._spent_s)
+        for thread in self._threads:
+            if thread.name not in spent and thread.native_id is not None:
+                with suppress(OSError):  # it ended just now, and its clock with it
+                    spent[thread.name] = time.clock_gettime(~thread.native_id << 3 | THREAD_CLOCK)
+        return {name: round(seconds, 3) for name, seconds in spent.items()}
 
     def _histograms(self) -> dict[str, Latency]:
-        camera = {"camera": self._motion.latency} if self._motion is not None else {}
+        camera = {"camera": self.motion.latency} if self.motion is not None else {}
         return {**self.latency, **camera, **self.output.latency}
 
     def _guarded(self, name: str, body: Callable[[threading.Event], None]) -> None:
@@ -248,6 +263,8 @@ class Node:
         except Exception as error:  # whatever it is, the autopilot must not be fed by what is left
             self.failure = self.failure or f"thread {name}: {type(error).__name__}: {error}"
             self.stop.set()
+        finally:
+            self._spent_s[name] = time.thread_time()
 
     def _receive(self, data: bytes, address: Address | None) -> None:
         arrival_ns = self._clock()
@@ -271,7 +288,7 @@ class Node:
 
     def _deliver_motion(self, motion: PixelMotion, picture: Picture) -> None:
         self._queue.put(Seen(motion, self._clock(), picture.arrival_ns))
-        self._wires.wake()
+        self.wires.wake()
 
     def _take_motions(self) -> None:
         while len(self._queue):
@@ -285,19 +302,22 @@ class Node:
     def _restart(self, reason: str) -> None:
         self.core.restart(reason, self._clock())
 
-    def _tick(self, stop: threading.Event) -> None:
-        line_ns = round(self._vehicle.status.line_s * 1e9)
-        next_line_ns = self._clock() + line_ns
-        next_word_ns = 0
+    def _keep_ticking(self, stop: threading.Event) -> None:
         while not stop.wait(TICK_S):
-            now = self._clock()
-            self.autopilot.tick(now)
-            if now >= next_word_ns:
-                next_word_ns = now + 500_000_000
-                self._judge(now)
-            if line_ns and now >= next_line_ns:
-                next_line_ns = now + line_ns
-                self._say(status_line(self.status()))
+            self.tick()
+
+    def tick(self) -> None:
+        """Everything that has its own rhythm: heartbeat, questions, what a person is told."""
+        now = self._clock()
+        self.autopilot.tick(now)
+        if now >= self._next_word_ns:
+            self._next_word_ns = now + WORD_NS
+            self._judge(now)
+        line_ns = round(self._vehicle.status.line_s * 1e9)
+        due_ns, self._next_line_ns = self._next_line_ns, self._next_line_ns or now + line_ns
+        if line_ns and due_ns is not None and now >= due_ns:
+            self._next_line_ns = now + line_ns
+            self._say(status_line(self.status()))
 
     def _judge(self, now_ns: int) -> None:
         out = self.output

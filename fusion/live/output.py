@@ -81,11 +81,15 @@ class Output:
         """Send until told to stop; the body of the output thread."""
         while not stop.is_set():
             with self._wake:
-                wait_ns = self._schedule.wait_ns(self._clock())
+                wait_ns = self.wait_ns()
                 if wait_ns > 0:
                     self._wake.wait(min(wait_ns * 1e-9, 0.1))
                     continue
             self.step()
+
+    def wait_ns(self) -> int:
+        """Time until the next opportunity to send; 0 if it is due."""
+        return self._schedule.wait_ns(self._clock())
 
     def step(self) -> Message | None:
         """One opportunity to send: the message that went out, or None with the reason counted."""

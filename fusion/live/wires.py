@@ -38,10 +38,15 @@ class Wires:
         What to wait for.
     woken
         Called after every wake-up, whatever its reason.
+
+    Attributes
+    ----------
+    all
+        The wires.
     """
 
     def __init__(self, wires: list[Wire], woken: Callable[[], None]) -> None:
-        self._wires, self._woken = wires, woken
+        self.all, self._woken = wires, woken
         self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
 
     def wake(self) -> None:
@@ -55,7 +60,7 @@ class Wires:
 
     def step(self, timeout_s: float) -> None:
         """Wait once, at most ``timeout_s``, and take everything that has arrived."""
-        files = {file: wire for wire in self._wires if (file := wire.fileno()) is not None}
+        files = {file: wire for wire in self.all if (file := wire.fileno()) is not None}
         try:
             ready, _, _ = select.select([self._bell, *files], [], [], timeout_s)
         except (OSError, ValueError):
@@ -70,9 +75,13 @@ class Wires:
     def keep_open(self, stop: threading.Event) -> None:
         """Bring back what has gone away until told to stop; the body of a thread, because opening may hang."""
         while not stop.is_set():
-            for wire in self._wires:
-                wire.reopen()
+            self.reopen()
             stop.wait(REOPEN_S)
+
+    def reopen(self) -> None:
+        """Bring back what has gone away, once."""
+        for wire in self.all:
+            wire.reopen()
 
     def close(self) -> None:
         """Release the bell; no thread may be in :meth:`run` any more."""

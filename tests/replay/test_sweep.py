@@ -137,7 +137,7 @@ def test_a_dask_cluster_that_loses_a_worker_loses_nothing(
     scheduler = _start("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(where))
     workers = []
     try:
-        for _ in range(300):
+        for _ in range(3000):
             if where.exists():
                 break
             time.sleep(0.1)
@@ -166,7 +166,7 @@ def _await_workers(address: str, count: int) -> None:
     from distributed import Client
 
     client = Client(address, set_as_default=False)
-    client.wait_for_workers(count, timeout=60)
+    client.wait_for_workers(count, timeout=300)
     client.close()
 
 

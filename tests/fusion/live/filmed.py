@@ -14,19 +14,14 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from axialnav.fusion.config import Config
 from axialnav.fusion.live.camera_source import FolderSource, Picture
-from axialnav.fusion.live.node import Node
-from axialnav.fusion.live.recording import FlightRecording
 from axialnav.fusion.live.vehicle import CameraInput, Vehicle
-from axialnav.fusion.live.warm_up import warm_up
 from axialnav.models.rig import Camera
 from axialnav.replay.flight import Flight, Truth, load_flight
 from axialnav.replay.flight_cut import cut_flight
 from axialnav.replay.run import replay
 from axialnav.replay.simulate.flight import simulate
 from axialnav.replay.simulate.scenarios import mission_of
-from tests.fusion.live.accounts import wait_for
-from tests.fusion.live.contract import Contract, ContractArduPilot
-from tests.fusion.live.streamed import Air, Course, StreamedVehicle, vehicle_of, with_numbers
+from tests.fusion.live.streamed import Course, with_numbers
 from tests.fusion.made_flights import Motion, Table
 
 UNSENT = ("att0", "baro0")  # MAVLink brings neither of them to us in this set-up
@@ -90,11 +85,12 @@ class Shutter(FolderSource):
         config: Config,
         frozen_s: tuple[float, float] = (0.0, 0.0),
         clock: Callable[[], int] = time.monotonic_ns,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         spec = config.sensor["cam0"]
         assert isinstance(spec, Camera)
         flight = load_flight(folder)
-        super().__init__(folder / "mav0/cam0/data", CameraInput(source=str(folder)), spec, clock, time.sleep)
+        super().__init__(folder / "mav0/cam0/data", CameraInput(source=str(folder)), spec, clock, sleep)
         self.t0_ns: int | None = None
         self.released = threading.Event()
         self._files = [flight.image_path("cam0", name) for name in flight.tables["cam0"].columns["filename"].tolist()]
@@ -119,47 +115,6 @@ class Shutter(FolderSource):
                 yield replace(picture, image=held)
             else:
                 yield picture
-
-
-class FilmedFlight:
-    """A node in flight, in real time: what the vehicle sends, its camera and the node, from entering to leaving.
-
-    ``without`` names sensors that neither the vehicle has nor the node knows.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        air: Air | None = None,
-        contract: Contract | None = None,
-        profile: str = "ardupilot",
-        without: tuple[str, ...] = (),
-        frozen_s: tuple[float, float] = (0.0, 0.0),
-        recording: FlightRecording | None = None,
-    ) -> None:
-        self.course = filmed_course(folder)
-        config = msgspec.structs.replace(self.course.config, disabled=without)
-        self.streamed = StreamedVehicle(self.course, air or Air(), contract or ContractArduPilot())
-        self.shutter = Shutter(folder, config, frozen_s)
-        ttys = {sensor: device for sensor, device in self.streamed.ttys.items() if sensor not in without}
-        vehicle = with_camera(vehicle_of(config, self.streamed.port, ttys, profile=profile))
-        warm_up(vehicle.filter, vehicle.estimator)
-        self.node = Node(vehicle, source=self.shutter, recording=recording)
-
-    def __enter__(self) -> FilmedFlight:
-        self.node.start()
-        self.streamed.start()
-        self.shutter.release(self.streamed.t0_ns)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.node.close()
-        self.streamed.close()
-
-    def until(self, seconds: float) -> bool:
-        """Wait for an instant of the flight."""
-        return wait_for(lambda: self.streamed.now_s() > seconds, 60.0)
 
 
 def with_camera(vehicle: Vehicle) -> Vehicle:

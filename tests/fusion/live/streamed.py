@@ -1,11 +1,13 @@
-"""A vehicle on loopback: a flight streamed as MAVLink over UDP and as NLink over pseudo-terminals, in real time.
+"""A vehicle on loopback: a flight streamed as MAVLink over UDP and as NLink over pseudo-terminals.
 
+It sends from a thread of its own, in real time, or whatever is due whenever it is told to (:meth:`advance`).
 The autopilot's boot clock runs on its own; datagrams and serial bytes are late, lost, out of order, damaged as asked.
 """
 
 from __future__ import annotations
 
 import heapq
+import math
 import os
 import socket
 import struct
@@ -97,7 +99,10 @@ def vehicle_of(config: Config, port: int, ttys: Mapping[str, str], **output: Any
 
 @dataclass
 class StreamedVehicle:
-    """Sends a flight in real time and hears what comes back; times are seconds since :meth:`start`."""
+    """Sends a flight and hears what comes back; times are seconds since the start.
+
+    ``carry`` takes everything to the other end in the place of :meth:`send`.
+    """
 
     course: Course
     air: Air = Air()
@@ -108,6 +113,8 @@ class StreamedVehicle:
     boot_at: Callable[[float, int], int] = lambda _t, boot: boot  # tampering with the boot clock
     flags: int = FLAGS_NAVIGATING
     udp_port: int = 0
+    clock: Callable[[], int] = time.monotonic_ns
+    carry: Callable[[str, bytes], None] | None = None
 
     def __post_init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -119,9 +126,11 @@ class StreamedVehicle:
         self.lock = threading.Lock()
         self.sent: Counter[str] = Counter()
         self.dropped: Counter[str] = Counter()
+        self.serial_bytes: Counter[str] = Counter()
         self.ttys: dict[str, str] = {}
         self.masters: dict[str, int] = {}
-        self.slaves: list[int] = []
+        self.slaves: dict[str, int] = {}
+        self._pulled: list[int] = []
         self.serial = [name for name in serial_sensors(self.course.config) if name in self.course.tables]
         for name in self.serial:
             self._plug(name)
@@ -129,34 +138,52 @@ class StreamedVehicle:
         self.stop = threading.Event()
         self.t0_ns = 0
         self.events = self._events()
+        self._sent_events = 0
+        self._due: list[tuple[float, int, str, bytes]] = []  # on their way: arrival, number, name, bytes
+        self._beat_s = 0.0
+        self.threads: list[threading.Thread] = []
 
     def _plug(self, name: str) -> None:
         master, slave = os.openpty()
         tty.setraw(slave)
         os.set_blocking(master, False)
         self.masters[name], self.ttys[name] = master, os.ttyname(slave)
-        self.slaves.append(slave)
+        self.slaves[name] = slave
+
+    def pull(self, name: str) -> None:
+        """Pull the plug of a serial sensor and plug it in again under another number."""
+        os.close(self.masters[name])
+        self._pulled.append(self.slaves[name])
+        self._plug(name)
 
     def start(self) -> None:
-        """Begin as soon as the node is heard: the flight's first instant is then."""
-        self.socket.settimeout(300.0)  # the node may have to compile first
-        _, self.peer = self.socket.recvfrom(4096)
+        """Begin as soon as the node is heard, in real time."""
+        self.begin()
         self.socket.settimeout(0.02)
-        self.t0_ns = time.monotonic_ns()
         self.threads = [threading.Thread(target=body, daemon=True) for body in (self._fly, self._listen)]
         for thread in self.threads:
             thread.start()
 
-    def close(self) -> None:
+    def begin(self) -> None:
+        """Wait for the first packet of the node: the flight's first instant is then."""
+        self.socket.settimeout(300.0)  # the node may have to compile first
+        _, self.peer = self.socket.recvfrom(4096)
+        self.t0_ns = self.clock()
+
+    def quiet(self) -> None:
+        """Send nothing more; what has been sent stays where it is."""
         self.stop.set()
         for thread in self.threads:
-            thread.join(2.0)
+            thread.join()
+
+    def close(self) -> None:
+        self.quiet()
         self.socket.close()
-        for handle in (*self.masters.values(), *self.slaves):
+        for handle in (*self.masters.values(), *self.slaves.values(), *self._pulled):
             os.close(handle)
 
     def now_s(self) -> float:
-        return (time.monotonic_ns() - self.t0_ns) * 1e-9
+        return (self.clock() - self.t0_ns) * 1e-9
 
     def boot(self, t_s: float) -> int:
         """Boot clock [ns] at flight time ``t_s``."""
@@ -231,26 +258,34 @@ class StreamedVehicle:
     # how it travels -------------------------------------------------------------------------------------------------
 
     def _fly(self) -> None:
-        due: list[tuple[float, int, str, bytes]] = []
-        beat = 0.0
-        for t, k, name, data in self.events:
-            while not self.stop.is_set():
-                now = self.now_s()
-                if now >= beat:
-                    beat += 1.0
-                    self._emit(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), "HEARTBEAT")
-                while due and due[0][0] <= now:
-                    self._deliver(*heapq.heappop(due)[2:])
-                if now >= t:
-                    break
-                time.sleep(max(min(t, due[0][0] if due else t) - now, 0.0) + 1e-4)
-            if self.stop.is_set():
-                return
-            self._plan(due, t, k, name, data)
-        while due:
-            self._deliver(*heapq.heappop(due)[2:])
+        while math.isfinite(at_s := self.next_s()):
+            time.sleep(max(at_s - self.now_s(), 0.0) + 1e-4)
+            self.advance()
 
-    def _plan(self, due: list[tuple[float, int, str, bytes]], t: float, k: int, name: str, data: Any) -> None:
+    def next_s(self) -> float:
+        """When something is to be sent next; infinite after the flight and when nothing more may be."""
+        if self.stop.is_set():
+            return math.inf
+        arrival = self._due[0][0] if self._due else math.inf
+        if self._sent_events == len(self.events):
+            return arrival
+        return min(self.events[self._sent_events][0], arrival, self._beat_s)
+
+    def advance(self) -> None:
+        """Send everything that is due by now, in its order."""
+        now = self.now_s()
+        while (at_s := self.next_s()) <= now:
+            if self._due and self._due[0][0] <= at_s:
+                (self.carry or self.send)(*heapq.heappop(self._due)[2:])
+            elif self._beat_s <= at_s:
+                self._beat_s += 1.0
+                self._emit(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 4, 3), "HEARTBEAT")
+            else:
+                t, k, name, data = self.events[self._sent_events]
+                self._sent_events += 1
+                self._plan(t, k, name, data)
+
+    def _plan(self, t: float, k: int, name: str, data: Any) -> None:
         if self.silent(name, t):
             return
         if not isinstance(data, bytes):
@@ -264,7 +299,7 @@ class StreamedVehicle:
         late = self.rng.exponential(self.air.jitter_s) if self.air.jitter_s else 0.0
         if self.rng.random() < self.air.reordered:
             late += 0.012
-        heapq.heappush(due, (t + min(late, 0.05), k, name, self._damage(name, data)))
+        heapq.heappush(self._due, (t + min(late, 0.05), k, name, self._damage(name, data)))
 
     def _damage(self, name: str, data: bytes) -> bytes:
         if self.rng.random() >= self.air.damaged:
@@ -280,35 +315,38 @@ class StreamedVehicle:
             spoilt[:] = self.rng.bytes(len(data))
         return bytes(spoilt)
 
-    def _deliver(self, name: str, data: bytes) -> None:
+    def send(self, name: str, data: bytes) -> None:
+        """Put bytes on the wire of a sensor, or on the link."""
         if name in self.masters:
             try:
-                os.write(self.masters[name], data)
+                self.serial_bytes[name] += os.write(self.masters[name], data)
             except OSError:
                 self.dropped[f"{name} unread"] += 1
-        elif self.peer is not None:
-            self.socket.sendto(data, self.peer)
         else:
-            self.dropped[f"{name} before the first contact"] += 1
+            assert self.peer is not None
+            self.socket.sendto(data, self.peer)
 
     def _emit(self, message: Any, name: str) -> None:
         with self.lock:
             data = message.pack(self.packer)
             self.packer.seq = (self.packer.seq + 1) % 256
         self.sent[name] += 1
-        self._deliver(name, data)
+        (self.carry or self.send)(name, data)
 
     def _listen(self) -> None:
         while not self.stop.is_set():
             try:
-                data, peer = self.socket.recvfrom(4096)
+                self.hear()
             except TimeoutError:
                 continue
-            self.peer = peer
-            t = self.now_s()
-            for message in self.contract.take(data, self.boot(t)):
-                if message.get_type() == "TIMESYNC" and message.tc1 == 0 and not self.silent("TIMESYNC", t):
-                    self._emit(mavlink.MAVLink_timesync_message(self.boot(t), message.ts1), "TIMESYNC")
+
+    def hear(self) -> None:
+        """Take one packet of the node and answer what it asks."""
+        data, self.peer = self.socket.recvfrom(4096)
+        t = self.now_s()
+        for message in self.contract.take(data, self.boot(t)):
+            if message.get_type() == "TIMESYNC" and message.tc1 == 0 and not self.silent("TIMESYNC", t):
+                self._emit(mavlink.MAVLink_timesync_message(self.boot(t), message.ts1), "TIMESYNC")
 
     # what came back -------------------------------------------------------------------------------------------------
 
@@ -325,11 +363,6 @@ class StreamedVehicle:
     def axial_errors(self, start_s: float, end_s: float) -> np.ndarray:
         """Axial velocity of every ODOMETRY minus the truth at its stamp [m/s], between two flight times."""
         return axial_errors(self.course, self.odometry(), start_s, end_s)
-
-    def stamps_s(self) -> np.ndarray:
-        """Arrival of every ODOMETRY or delta in flight time [s]."""
-        names = ("ODOMETRY", "VISION_POSITION_DELTA")
-        return np.array([(t - self.boot_ns) * 1e-9 for t, m in self.contract.messages if m.get_type() in names])
 
 
 def ahead(config: Config) -> Config:

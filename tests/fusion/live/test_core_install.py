@@ -11,9 +11,9 @@ import msgspec
 import pytest
 
 from axialnav.fusion.strict_toml import dump
-from tests.fusion.live.accounts import wait_for
+from tests.fusion.live.accounts import PATIENCE_S, wait_for
 from tests.fusion.live.streamed import StreamedVehicle, ahead, streamed_flight, vehicle_of
-from tests.fusion.live.test_live_stream import SCENE, without_none
+from tests.fusion.live.test_live_stream import SLOW_SCENE, without_none
 from tests.house import ROOT
 
 AWAY = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
@@ -42,7 +42,7 @@ def test_the_core_alone_flies(tmp_path: Path) -> None:
     there = "import importlib.util as u; print(*[n for n in {!r} if u.find_spec(n)])"
     assert run(python, "-c", there.format(EXTRAS), cwd=tmp_path).split() == []
     assert "--config" in run(axialnav, "live", "--help", cwd=tmp_path)
-    course = streamed_flight(SCENE)
+    course = streamed_flight(SLOW_SCENE)
     streamed = StreamedVehicle(course)
     vehicle = vehicle_of(ahead(course.config), streamed.port, streamed.ttys)
     data = {**msgspec.to_builtins(vehicle), "record": {"folder": str(tmp_path / "flights")}}
@@ -60,9 +60,9 @@ def test_the_core_alone_flies(tmp_path: Path) -> None:
         assert "compiling" in process.stdout.readline()
         assert "sending: full" in process.stdout.readline()  # everything has been compiled by then
         streamed.start()
-        assert wait_for(lambda: streamed.contract.used("ODOMETRY") > 30, 20.0)
+        assert wait_for(lambda: streamed.contract.used("ODOMETRY") > 30)
         process.terminate()
-        out, err = process.communicate(timeout=20.0)
+        out, err = process.communicate(timeout=PATIENCE_S)
     finally:
         process.kill()
         streamed.close()

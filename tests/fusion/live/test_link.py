@@ -16,6 +16,7 @@ from axialnav.fusion.live.autopilot import Autopilot
 from axialnav.fusion.live.transport import Link, UdpLink, open_link
 from axialnav.fusion.live.vehicle import Inputs, Mavlink, Vehicle
 from axialnav.fusion.readings import ImuSample
+from tests.fusion.live.accounts import PATIENCE_S
 from tests.fusion.live.streamed import streamed_flight
 
 S, MS = 1_000_000_000, 1_000_000
@@ -142,8 +143,8 @@ def test_another_autopilot_than_the_profile_says_is_told() -> None:
 
 
 def received(link: Link) -> Any:
-    """What arrives within a second."""
-    select.select([link.fileno()], [], [], 1.0)
+    """What arrives next."""
+    select.select([link.fileno()], [], [], PATIENCE_S)
     return link.receive()
 
 
@@ -160,7 +161,7 @@ def test_a_listening_link_answers_only_where_a_listed_sender_was_heard() -> None
     link = UdpLink("127.0.0.1", 0, listen=True)
     other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     other.bind(("127.0.0.1", 0))
-    other.settimeout(1.0)
+    other.settimeout(PATIENCE_S)
     try:
         assert link.send(b"nobody") is False
         other.sendto(b"hello", ("127.0.0.1", link.port))

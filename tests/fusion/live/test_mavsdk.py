@@ -13,10 +13,10 @@ import pytest
 
 from axialnav.fusion.live.core import Snapshot
 from axialnav.fusion.live.mavlink_out import heartbeat, odometry, position_delta
+from tests.fusion.live.accounts import PATIENCE_S
 from tests.fusion.live.test_output import state
 
 AXIS = np.array([1.0, 0.0, 0.0])
-WAIT_S = 10.0
 
 
 class Decoder:
@@ -29,7 +29,7 @@ class Decoder:
         self.packer = mavlink.MAVLink(None, srcSystem=1, srcComponent=197)
         found = threading.Event()
         self.station.subscribe_on_new_system(lambda *_: found.set())
-        for _ in range(100):
+        for _ in range(1000):
             self.give(heartbeat())
             if found.wait(0.05) or self.station.system_count():
                 break
@@ -52,7 +52,7 @@ class Decoder:
         handle = self.direct.subscribe_message(message.get_type(), take)
         try:
             self.give(message)
-            assert ready.wait(WAIT_S), f"{message.get_type()} was not recognised"
+            assert ready.wait(PATIENCE_S), f"{message.get_type()} was not recognised"
         finally:
             self.direct.unsubscribe_message(handle)
         assert (got[0].system_id, got[0].component_id) == (1, 197)

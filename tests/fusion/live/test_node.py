@@ -17,6 +17,7 @@ from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.security import signing_ticks
 from axialnav.fusion.live.status import StatusServer, encode, status_line
 from axialnav.fusion.live.vehicle import Mavlink, Status
+from tests.fusion.live.accounts import PATIENCE_S
 from tests.fusion.live.test_output import VEHICLE
 
 KEY = bytes(range(32))
@@ -117,7 +118,7 @@ def test_the_status_answers_on_the_loopback_address_alone_and_tells_no_key(tmp_p
     thread.start()
     try:
         assert server._socket.getsockname()[0] == "127.0.0.1"
-        with socket.create_connection(("127.0.0.1", server.port), timeout=5.0) as asked:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE_S) as asked:
             text = asked.makefile("rb").read()
     finally:
         stop.set()

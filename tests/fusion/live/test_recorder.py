@@ -10,6 +10,7 @@ import sys
 import threading
 from collections import Counter
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ from axialnav.fusion.readings import (
     UwbTdoa,
     WallRange,
 )
+from tests.fusion.live.accounts import wait_for
 
 PICTURE = np.random.default_rng(3).integers(0, 255, size=(48, 64), dtype=np.uint8)
 
@@ -219,7 +221,10 @@ def test_numbers_too_have_a_limit_in_memory(tmp_path: Path) -> None:
     assert status.dropped["imu0"] == 1000 - taken
 
 
-def test_a_filling_disk_stops_pictures_then_everything_and_comes_back(tmp_path: Path) -> None:
+def test_a_filling_disk_stops_pictures_then_everything_and_comes_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("axialnav.fusion.live.recorder.recorder.FLUSH_S", 0.1)
     free = {"now": 10 << 30}
     recorder = Recorder(tmp_path / "a.mcap", free_bytes=lambda: free["now"])
     phases = [("plenty", 10 << 30), ("little", 100 << 20), ("none", 1 << 20), ("again", 10 << 30)]
@@ -228,11 +233,7 @@ def test_a_filling_disk_stops_pictures_then_everything_and_comes_back(tmp_path: 
         for k in range(20):
             recorder.write("cam0", 100 * phase + k, frame(100 * phase + k))
             recorder.write("imu0", 100 * phase + k, imu(100 * phase + k))
-        for _ in range(2):  # two rounds of the writing thread: the first may have begun before the change
-            done = threading.Event()
-            while recorder.status().queued:
-                done.wait(0.01)
-            done.wait(0.12)
+        assert wait_for(partial(has_done_with, recorder, 40 * (phase + 1)))
     status = recorder.close()
     assert (status.written["cam0"], status.written["imu0"]) == (40, 60)
     assert (status.dropped["cam0"], status.dropped["imu0"]) == (40, 20)
@@ -247,16 +248,25 @@ def test_a_filling_disk_stops_pictures_then_everything_and_comes_back(tmp_path: 
     ]
 
 
+def has_done_with(recorder: Recorder, count: int) -> bool:
+    """Whether so many readings are on disk or given up."""
+    status = recorder.status()
+    return sum(what.get(s, 0) for what in (status.written, status.dropped) for s in ("imu0", "cam0")) == count
+
+
 FULL_DISK = """
-import resource, sys, time
+import resource, sys
+from axialnav.fusion.live.recorder import recorder as module
 from axialnav.fusion.live.recorder.recorder import Recorder
-from tests.fusion.live.test_recorder import imu, frame
+from tests.fusion.live.accounts import wait_for
+from tests.fusion.live.test_recorder import has_done_with, imu
+module.FLUSH_S = 0.1
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
 recorder = Recorder(sys.argv[1])
 for t in range(4000):
     recorder.write("imu0", t * 5_000_000, imu(t * 5_000_000))
     if t % 400 == 0:
-        time.sleep(0.12)
+        assert wait_for(lambda: has_done_with(recorder, t + 1))
 status = recorder.close()
 print(status.written["imu0"], status.dropped["imu0"], status.problem)
 """

@@ -5,8 +5,8 @@
  * DRIVER_BREAKS   number of the frame after which the device is gone, once
  * DRIVER_RETURNS  milliseconds after which it can be opened again; never if not given
  *
- * Frames are YUYV, 30 a second, of a wall that moves 3 px a frame to the left.  Stamps are monotonic, of the start of the
- * exposure, which is 20 ms before a buffer can be taken. 
+ * Frames are YUYV, 15 a second, of a wall that moves 3 px a frame to the left.  Stamps are monotonic, of the start of the
+ * exposure, which is 20 ms before a buffer can be taken.  Who comes late on a busy machine gets every frame all the same.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -22,11 +22,11 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { BUFFERS = 8, STEP_PX = 3, AGE_US = 20000 };
+enum { BUFFERS = 8, STEP_PX = 3, AGE_US = 20000, PERIOD_US = 66667 };
 
 static int device = -1, width = 640, height = 480, queued[BUFFERS], waiting, gone;
 static long exposure = 157, automatic = 3, gain = 1, frame;
-static int64_t gone_ms;
+static int64_t gone_ms, due_us;
 static unsigned char *buffers[BUFFERS];
 
 static int refuses(const char *what) {
@@ -39,10 +39,19 @@ static int is_ours(const char *path) {
     return named && path && !strcmp(path, named);
 }
 
-static int64_t now_ms(void) {
+static int64_t now_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static int64_t now_ms(void) { return now_us() / 1000; }
+
+/* The file becomes readable when the next frame is there. */
+static int arm(int64_t at_us) {
+    struct itimerspec at = {{0, 0}, {at_us / 1000000, at_us % 1000000 * 1000}};
+    due_us = at_us;
+    return timerfd_settime(device, TFD_TIMER_ABSTIME, &at, NULL);
 }
 
 static int connect_camera(void) {
@@ -125,18 +134,17 @@ static int control(unsigned long request, struct v4l2_control *c) {
 }
 
 static int take_buffer(struct v4l2_buffer *b) {
-    uint64_t due;
+    uint64_t fired;
     const char *breaks = getenv("DRIVER_BREAKS");
     if (breaks && !gone_ms && frame >= atol(breaks)) gone_ms = now_ms(), gone = 1;
     if (gone) return errno = ENODEV, -1;
-    if (read(device, &due, sizeof due) != sizeof due || !waiting) return errno = EAGAIN, -1;
-    frame += due;
+    if (!waiting || read(device, &fired, sizeof fired) != sizeof fired) return errno = EAGAIN, -1;
+    int64_t us = due_us - AGE_US;
+    arm(due_us + PERIOD_US);
+    frame++;
     int index = queued[0];
     memmove(queued, queued + 1, sizeof(int) * --waiting);
     draw(buffers[index]);
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    int64_t us = (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000 - AGE_US;
     b->index = index, b->length = b->bytesused = bytes(), b->m.offset = 4096 * index, b->sequence = frame, b->field = V4L2_FIELD_NONE;
     b->timestamp.tv_sec = us / 1000000, b->timestamp.tv_usec = us % 1000000;
     b->flags = V4L2_BUF_FLAG_MAPPED | V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
@@ -144,9 +152,8 @@ static int take_buffer(struct v4l2_buffer *b) {
 }
 
 static int stream(int on) {
-    struct itimerspec pace = {{0, on ? 33333333 : 0}, {0, on ? 33333333 : 0}};
     if (!on) waiting = 0;
-    return timerfd_settime(device, 0, &pace, NULL);
+    return arm(on ? now_us() + PERIOD_US : 0);
 }
 
 static int answer(unsigned long request, void *given) {
@@ -183,7 +190,7 @@ static int answer(unsigned long request, void *given) {
     case VIDIOC_G_PARM: case VIDIOC_S_PARM: {
         struct v4l2_streamparm *p = given;
         p->parm.capture.capability = V4L2_CAP_TIMEPERFRAME;
-        p->parm.capture.timeperframe = (struct v4l2_fract){1, 30};
+        p->parm.capture.timeperframe = (struct v4l2_fract){1, 15};
         return 0;
     }
     case VIDIOC_QUERYCTRL: {
