@@ -24,7 +24,7 @@ from axialnav.replay.flight import load_flight
 from tests.fusion.live.accounts import wait_for
 from tests.fusion.live.flown import Flown, fly
 from tests.fusion.live.sender_process import SenderProcess
-from tests.fusion.live.streamed import ahead, axial_errors, streamed_flight, vehicle_of
+from tests.fusion.live.streamed import ahead, streamed_flight, vehicle_of
 from tests.fusion.live.test_output import VEHICLE
 from tests.fusion.made_flights import Scene
 
@@ -133,7 +133,6 @@ def test_the_sender_is_killed_and_another_comes(tmp_path: Path) -> None:
     told = second.finish()
     assert node.failure == ""
     assert told.used > 0
-    assert np.abs(axial_errors(make(), told.odometry, 0.0, 60.0)).max() < 0.5
     assert told.odometry[0, 2] >= 1  # reset counter: another autopilot, another filter
 
 
