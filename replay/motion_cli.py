@@ -61,6 +61,10 @@ def motion_command(
         Windows per condition of the experiment; its own number if not given.
     """
     if experiment is not None:
+        if flight is not None:
+            raise ConfigError(
+                f"--experiment {experiment} renders its own walls and takes no flight; leave out {flight}"
+            )
         return _experiment(experiment, out or Path("runs") / experiment, seed, trials)
     if flight is None:
         raise ConfigError("motion needs a flight folder, or --experiment NAME")

@@ -27,6 +27,7 @@ def test_an_experiment_prints_its_table_and_names_its_files(tmp_path: Path) -> N
     [
         ((), "needs a flight"),
         (("--experiment", "fig9"), "single-vs-composite"),
+        (("a-flight", "--experiment", "frames"), "leave out a-flight"),
         (("--experiment", "frames", "--trials", "0"), "at least 1 trial"),
     ],
 )

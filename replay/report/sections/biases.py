@@ -32,7 +32,7 @@ def build(run: Run) -> Section:
     """Accelerometer and gyro bias in body axes; scale and surface offset; UWB biases; each with its sigma."""
     track = run.track
     figures = [
-        _three(run, track.accel_bias_m_s2, E_ACCEL_BIAS, "accelerometer bias [m/s^2]"),
+        _three(run, track.accel_bias_m_s2, E_ACCEL_BIAS, "accel. bias [m/s²]"),
         _three(run, np.degrees(track.gyro_bias_rad_s), E_GYRO_BIAS, "gyro bias [deg/s]", math.degrees(1.0)),
         *_others(run),
     ]
@@ -63,7 +63,7 @@ def _others(run: Run) -> list[Figure]:
     """Scale of the image and offset of the surface, where the flight lets them be estimated."""
     track, figures = run.track, []
     named = (
-        (track.blur_scale, E_BLUR_SCALE, "scale of the image motion [-]", BLUE),
+        (track.blur_scale, E_BLUR_SCALE, "image scale [-]", BLUE),
         (track.wall_offset_m, E_WALL_OFFSET, "surface offset [m]", GREEN),
     )
     for values, state, title, colour in named:
