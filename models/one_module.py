@@ -127,7 +127,7 @@ class WholeLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
                 # inlined where it is called once, and left out where it never is; without a name in the object code,
                 # because the loader would hand out a function whose arguments were optimised away under that name
                 function.linkage = "private"
-        builder = codegen.create_pass_builder(_machine(self._codegen), opt=3, loop_vectorize=True, slp_vectorize=True)
+        builder = codegen.create_pass_builder(_machine(self._codegen), opt=2, loop_vectorize=True, slp_vectorize=True)
         builder.getModulePassManager().run(self._final_module, builder)
 
 
