@@ -64,6 +64,15 @@ class Source(Protocol):
         """Release the camera."""
 
 
+def one_thread() -> None:
+    """Have OpenCV work in the thread that calls it, in this whole process.
+
+    It would hand half of every small step to another thread and wait for it: a sixth more processor time on board, and
+    late pictures where that thread has to wait for its turn.
+    """
+    cv2.setNumThreads(1)
+
+
 def open_source(
     camera: CameraInput, spec: Camera, clock: Callable[[], int], sleep: Callable[[float], None] = time.sleep
 ) -> Source:

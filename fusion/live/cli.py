@@ -55,7 +55,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
 
 def _live(path: Path) -> int:
     """Fly until SIGTERM or SIGINT; exit code 3 if a thread failed."""
-    from axialnav.fusion.live.camera_source import open_source
+    from axialnav.fusion.live.camera_source import one_thread, open_source
     from axialnav.fusion.live.node import Node
     from axialnav.fusion.live.recording import FlightRecording
     from axialnav.fusion.live.vehicle import Vehicle
@@ -68,6 +68,7 @@ def _live(path: Path) -> int:
         from axialnav.fusion.live.camera import require_surface
 
         require_surface(vehicle.filter, vehicle.camera.sensor)
+        one_thread()
     _say("compiling and loading the filter")
     warm_up(vehicle.filter, vehicle.estimator)
     if vehicle.camera is not None:
@@ -91,8 +92,10 @@ def _live(path: Path) -> int:
 def _camera(path: Path, seconds: float) -> int:
     """Measure the camera for a while; exit code 1 if something is not as it should be, 3 without a picture."""
     from axialnav.fusion.live.camera_check import check_camera
+    from axialnav.fusion.live.camera_source import one_thread
     from axialnav.fusion.live.vehicle import Vehicle
 
+    one_thread()
     lines, good, pictures = check_camera(Vehicle.from_toml(path), seconds, time.monotonic_ns, threading.Event())
     for line in lines:
         _say(line)

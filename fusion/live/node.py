@@ -28,7 +28,6 @@ from axialnav.fusion.outcome import Outcome, Verdict
 from axialnav.fusion.readings import PixelMotion, Reading
 
 CAPACITY = 64  # motions: two seconds
-AT_ONCE = 16
 TICK_S = 0.02
 WORD_NS = 500_000_000
 THREAD_CLOCK = 6  # Linux: processor time of a thread by its number; by its handle would crash where it has just ended
@@ -51,11 +50,9 @@ class MavlinkWire:
         self.fileno, self.reopen = link.fileno, link.reopen
 
     def ready(self) -> None:
-        """Take what has arrived, a limited number of datagrams so that the other wires have their turn."""
-        for _ in range(AT_ONCE):
-            data, address = self._link.receive()
-            if not data:
-                return
+        """Take the next datagram: most come alone, and the loop is back at once for another."""
+        data, address = self._link.receive()
+        if data:
             self._take(data, address)
 
 

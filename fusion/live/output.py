@@ -5,6 +5,7 @@ Nothing is sent unless the estimate is fresh and good enough: both autopilots wo
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable
@@ -104,11 +105,12 @@ class Output:
     def _try(self, frame_ns: int | None) -> Message | None:
         began_ns = self._clock()
         now = self._snapshot(began_ns)
-        self.reason = self._why_not(now, began_ns)
+        sigma = self._sigma(now) if now is not None else math.inf
+        self.reason = self._why_not(now, sigma, began_ns)
         if now is None or self.reason != SENDING:
             self.withheld[self.reason] += 1
             return None
-        message = self._message(now)
+        message = self._message(now, sigma)
         if message is None or not self._send(message):
             self.withheld["no way out yet" if message is not None else "first of a series of deltas"] += 1
             return None
@@ -121,7 +123,7 @@ class Output:
             self.latency["frame_to_message"].add((self.sent_ns - frame_ns) * 1e-9)
         return message
 
-    def _why_not(self, now: Snapshot | None, t_ns: int) -> str:
+    def _why_not(self, now: Snapshot | None, sigma_m_s: float, t_ns: int) -> str:
         rules = self._rules
         if now is None:
             return "the filter has not started"
@@ -133,7 +135,7 @@ class Output:
             return "no reading has been fused of late: camera, range and UWB are silent or refused"
         if not now.state.velocity_valid:
             return "the velocity is not valid: no axial aid for too long"
-        if self._sigma(now) > rules.max_sigma_velocity_m_s:
+        if sigma_m_s > rules.max_sigma_velocity_m_s:
             return "the velocity is too uncertain"
         return self._check.verdict(now.state, t_ns) or SENDING
 
@@ -143,26 +145,26 @@ class Output:
             return now.state.sigma_axial_velocity_m_s
         return float(np.sqrt(np.linalg.eigvalsh(now.state.covariance[E_VEL : E_VEL + 3, E_VEL : E_VEL + 3]).max()))
 
-    def _message(self, now: Snapshot) -> Message | None:
+    def _message(self, now: Snapshot, sigma_m_s: float) -> Message | None:
         before, self._before = self._before, now
         if self._jumped(before, now):
             self.reset_counter = (self.reset_counter + 1) % 256
         if not self._deltas:
             content: Content = self._content
-            quality = self._quality(now)
+            quality = self._quality(now, sigma_m_s)
             return odometry(now, self._axis, self._heading_rad, content, quality, self.reset_counter)
         if before is None or before.restarts != now.restarts or now.state.t_ns - before.state.t_ns > MAX_DELTA_NS:
             return None
         return position_delta(before, now)
 
-    def _quality(self, now: Snapshot) -> int:
+    def _quality(self, now: Snapshot, sigma_m_s: float) -> int:
         """Per cent, 100 for a sigma of zero; 1 at the limit, or while nothing that sees the axis is fused.
 
         0 would read as "unknown".
         """
         if now.state.t_ns - now.axial_ns > self._rules.aid_stale_s * 1e9:
             return 1
-        share = 1.0 - self._sigma(now) / self._rules.max_sigma_velocity_m_s
+        share = 1.0 - sigma_m_s / self._rules.max_sigma_velocity_m_s
         return max(round(100.0 * share), 1)
 
     def _jumped(self, before: Snapshot | None, now: Snapshot) -> bool:
