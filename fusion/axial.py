@@ -58,6 +58,7 @@ from axialnav.models.tangent import rotation_between
 
 Array = NDArray[np.float64]
 DOUBT_TIME_S = 2.0
+DRAG_S = 1.0  # drag and climbs, which tilt does not see, last for so long
 RELIEF = 0.5  # an accelerometer in doubt is believed again below this share of the limit
 MAX_TILT_COSINE = 0.2  # steeper than 78 degrees, tilt says nothing of the acceleration
 
@@ -311,6 +312,7 @@ def axial_settings(config: Config) -> Records:
     settings = build_settings(config)
     noise = config.axial.accel_noise if units else config.axial.thrust_noise
     settings["shadow_m_s2"] = np.hypot(settings["shadow_m_s2"], noise)
+    settings["shadow_alike_s"] = 0.0 if units else DRAG_S
     return settings
 
 

@@ -194,8 +194,8 @@ SETTINGS_FIELDS: Final = (
     "wall_offset_walk", "doubt_m_s2", "doubt_sigmas", "doubt_time_s",
     "trial_s", "evidence", "trials_to_clear", "evidence_to_clear", "dead_reckoning_s", "invalid_s",
     "reanchor_aided_s", "reanchor_alone_s",
-    "supervised", "timeout_s", "shadow_m_s2", "kinematic_m", "kinematic_sigmas", "agree_s", "fit_m", "anchor_m",
-    "jump_m", "jump_sigmas", "stuck_count", "stuck_m", "nlos_db", "nlos_scale_db",
+    "supervised", "timeout_s", "shadow_m_s2", "shadow_alike_s", "kinematic_m", "kinematic_sigmas", "agree_s", "fit_m",
+    "anchor_m", "jump_m", "jump_sigmas", "stuck_count", "stuck_m", "nlos_db", "nlos_scale_db",
 )  # fmt: skip
 SETTINGS: Final = np.dtype([(name, "f8") for name in SETTINGS_FIELDS])
 
@@ -268,6 +268,7 @@ def build_settings(config: Config) -> Records:
         "supervised": float(config.supervisor.enabled),
         "timeout_s": config.supervisor.timeout_s,
         "shadow_m_s2": config.supervisor.shadow_m_s2,
+        "shadow_alike_s": 0.0,
         "kinematic_m": config.supervisor.kinematic_m,
         "kinematic_sigmas": config.supervisor.kinematic_sigmas,
         "agree_s": config.supervisor.agree_s,

@@ -142,6 +142,6 @@ def _excess(a: Integer, b: Integer, s: Record, seen: Record, m: Record, w: Recor
     for k in range(len(WINDOWS)):
         apart = w.ways[k, a] - (w.ways[k, b] if b >= 0 else 0.0)
         if np.isfinite(apart):
-            variance = displacement_variance(WINDOWS[k] * BLOCK_S, w.ray, m) + 0.5 * seen.scatter * seen.scatter
+            variance = displacement_variance(WINDOWS[k] * BLOCK_S, w.ray, m, c) + 0.5 * seen.scatter * seen.scatter
             largest = max(largest, abs(apart) / allowed_m(variance, c))
     return float(largest)

@@ -77,7 +77,7 @@ def kinematics(t_ns: int, seen: Record, m: Record, w: Record, c: Record) -> floa
             apart = u[0] * w.q[0] + u[1] * w.q[1] + u[2] * w.q[2]
             if not np.isfinite(apart):
                 continue
-            variance = displacement_variance(window * BLOCK_S, u, m) + 0.5 * seen.scatter * seen.scatter
+            variance = displacement_variance(window * BLOCK_S, u, m, c) + 0.5 * seen.scatter * seen.scatter
             excess = abs(apart) / allowed_m(variance, c)
             largest = max(largest, excess)
             if excess > 1.0 and (t_ns - m.t_shadow) * 1e-9 < FLOW_FRESH_S:
@@ -91,7 +91,7 @@ def _ask_inertia(t_ns: int, window: Integer, apart: float, u: Array, m: Record, 
     span = window * BLOCK_S
     carried = third_witness(window, BLOCK_S, u, m)
     drift2 = 0.25 * m.shadow_q * span * span * span * span
-    variance = displacement_variance(span, u, m) + drift2
+    variance = displacement_variance(span, u, m, c) + drift2
     limit = allowed_m(variance, c)
     if abs(carried) < limit:
         return

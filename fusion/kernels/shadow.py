@@ -167,16 +167,17 @@ def recover_velocity(m: Record, w: Record, U: Array) -> None:
 
 
 @kernel
-def displacement_variance(window_s: float, u: Array, m: Record) -> float:
+def displacement_variance(window_s: float, u: Array, m: Record, c: Record) -> float:
     """Variance of the shadow's way along the unit vector ``u`` (3,) over the last ``window_s`` [m^2].
 
-    Velocity errors that are alike over a time V / q add up like independent ones over longer windows.
+    Velocity errors that are alike over a time V / q add up like independent ones over longer windows; what drives the
+    shadow may be wrong for longer than that, ``c.shadow_alike_s``.
     """
     variance = 0.0
     for i in range(3):
         for j in range(3):
             variance += u[i] * m.shadow_V[i, j] * u[j]
-    alike_s = variance / m.shadow_q
+    alike_s = max(variance / m.shadow_q, c.shadow_alike_s)
     return float(variance * window_s * min(window_s, 2.0 * alike_s))
 
 

@@ -146,7 +146,7 @@ def test_pixel_motion_with_a_wrong_scale_is_outvoted_by_uwb_and_inertia() -> Non
     flags = with_it.track.flags[during(flight, 0.0, 8.0)]
     assert ((flags & (Health.MOTION_SUSPECT | Health.UWB_SUSPECT)) > 0).mean() > 0.3
     assert not (without.track.flags & Health.MOTION_SUSPECT).any()
-    assert (states(with_it, "motion0")[flight.t_s > EVENT_S + 17.0] == SourceState.OK).all()
+    assert (states(with_it, "motion0")[flight.t_s > EVENT_S + 16.0] == SourceState.OK).all()
 
 
 @pytest.mark.parametrize(
