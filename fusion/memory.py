@@ -231,12 +231,10 @@ def build_settings(config: Config) -> Records:
     """
     imu, tune, fault = the_imu(config), config.imu, config.imu_fault
     accel = (imu.accel_noise_density * tune.accel_noise_scale) ** 2
-    axis = config.axis
     values: dict[str, Any] = {
+        "shadow_alike_s": 0.0,
         "gravity_m_s2": config.gravity_m_s2,
-        "axial_x": axis[0],
-        "axial_y": axis[1],
-        "axial_z": axis[2],
+        **dict(zip(("axial_x", "axial_y", "axial_z"), config.axis, strict=True)),
         "gyro_variance": (imu.gyro_noise_density * tune.gyro_noise_scale) ** 2,
         "gyro_walk": (imu.gyro_bias_walk * tune.gyro_walk_scale) ** 2,
         "accel_variance": accel,
@@ -268,7 +266,6 @@ def build_settings(config: Config) -> Records:
         "supervised": float(config.supervisor.enabled),
         "timeout_s": config.supervisor.timeout_s,
         "shadow_m_s2": config.supervisor.shadow_m_s2,
-        "shadow_alike_s": 0.0,
         "kinematic_m": config.supervisor.kinematic_m,
         "kinematic_sigmas": config.supervisor.kinematic_sigmas,
         "agree_s": config.supervisor.agree_s,
