@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from axialnav.fusion.errors import ConfigError
 from axialnav.fusion.live.camera import Grabber, MotionStage
-from axialnav.fusion.live.camera_source import Source, open_source
+from axialnav.fusion.live.camera_source import Source, open_source, require_source
 from axialnav.fusion.live.vehicle import Vehicle
 from axialnav.fusion.live.warm_up import warm_camera
 from axialnav.fusion.readings import PixelMotion
@@ -30,6 +30,7 @@ def check_camera(
         raise ConfigError("the vehicle file has no [camera]; add one with source and sensor")
     spec = vehicle.filter.sensor[vehicle.camera.sensor]
     assert isinstance(spec, Camera)
+    require_source(vehicle.camera)
     if spec.surface is not None:
         warm_camera(vehicle.filter, vehicle.camera.sensor, spec)  # a compiler at work would look like missing pictures
     source = open_source(vehicle.camera, spec, clock)

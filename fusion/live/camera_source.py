@@ -6,6 +6,7 @@ drivers); the stamp is taken from there and not from the moment of reading, whic
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -64,13 +65,31 @@ class Source(Protocol):
         """Release the camera."""
 
 
-def one_thread() -> None:
-    """Have OpenCV work in the thread that calls it, in this whole process.
+def settle_opencv() -> None:
+    """Have OpenCV work in the thread that calls it and keep its warnings to itself, in this whole process.
 
     It would hand half of every small step to another thread and wait for it: a sixth more processor time on board, and
-    late pictures where that thread has to wait for its turn.
+    late pictures where that thread has to wait for its turn.  What goes wrong is said in one line of ours.
     """
     cv2.setNumThreads(1)
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+
+
+def require_source(camera: CameraInput) -> None:
+    """Refuse a source that is not there, before anything that takes long.
+
+    Raises
+    ------
+    ConfigError
+        Nothing has that name, or it is not for us.
+    """
+    try:
+        os.close(os.open(camera.source, os.O_RDONLY | os.O_NONBLOCK))
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            f"camera.source {camera.source}: {getattr(error, 'strerror', error)}; is the camera plugged in? "
+            f"`ls /dev/v4l/by-id` shows what is; devices are for the group video"
+        ) from None
 
 
 def open_source(

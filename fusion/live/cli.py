@@ -16,6 +16,7 @@ VERBS = {
     "live": "Run the on-board estimator: sensors and autopilot in, fused odometry out.",
     "camera": "Open the camera of a vehicle.toml and print what was set and what comes out of it.",
 }
+LONGEST_S = 3600.0
 SWITCH_S = 0.001  # threads change places every millisecond: a picture being measured must not delay a message
 
 
@@ -49,15 +50,28 @@ def _parser(verb: str) -> argparse.ArgumentParser:
     parser = _OneLine(prog=f"axialnav {verb}", description=VERBS[verb], allow_abbrev=False)
     parser.add_argument("--config", type=Path, required=True, metavar="TOML", help="the vehicle.toml")
     if verb == "camera":
-        parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long to measure (5)")
+        parser.add_argument("--seconds", type=_seconds, default=5.0, metavar="S", help="how long to measure (5)")
     return parser
+
+
+def _seconds(word: str) -> float:
+    """A time that can be waited for."""
+    seconds = float(word)
+    if not 0.0 < seconds <= LONGEST_S:
+        raise ValueError(word)
+    return seconds
+
+
+_seconds.__name__ = f"number of seconds (more than 0, up to {LONGEST_S:g})"  # argparse names it in its complaint
 
 
 def _live(path: Path) -> int:
     """Fly until SIGTERM or SIGINT; exit code 3 if a thread failed."""
-    from axialnav.fusion.live.camera_source import one_thread, open_source
+    from axialnav.fusion.live.camera_source import open_source, require_source, settle_opencv
     from axialnav.fusion.live.node import Node
     from axialnav.fusion.live.recording import FlightRecording
+    from axialnav.fusion.live.security import read_key
+    from axialnav.fusion.live.transport import open_link
     from axialnav.fusion.live.vehicle import Vehicle
     from axialnav.fusion.live.warm_up import warm_up
 
@@ -68,7 +82,11 @@ def _live(path: Path) -> int:
         from axialnav.fusion.live.camera import require_surface
 
         require_surface(vehicle.filter, vehicle.camera.sensor)
-        one_thread()
+        require_source(vehicle.camera)
+        settle_opencv()
+    open_link(vehicle.mavlink.link).close()  # what is wrong with it is said before anything that takes long
+    if vehicle.mavlink.key_file:
+        read_key(vehicle.mavlink.key_file)
     _say("compiling and loading the filter")
     warm_up(vehicle.filter, vehicle.estimator)
     if vehicle.camera is not None:
@@ -92,10 +110,10 @@ def _live(path: Path) -> int:
 def _camera(path: Path, seconds: float) -> int:
     """Measure the camera for a while; exit code 1 if something is not as it should be, 3 without a picture."""
     from axialnav.fusion.live.camera_check import check_camera
-    from axialnav.fusion.live.camera_source import one_thread
+    from axialnav.fusion.live.camera_source import settle_opencv
     from axialnav.fusion.live.vehicle import Vehicle
 
-    one_thread()
+    settle_opencv()
     lines, good, pictures = check_camera(Vehicle.from_toml(path), seconds, time.monotonic_ns, threading.Event())
     for line in lines:
         _say(line)

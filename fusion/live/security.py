@@ -36,7 +36,8 @@ def read_key(path: str | Path) -> bytes:
     try:
         text = Path(path).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"mavlink.key_file {path}: cannot be read: {error}") from None
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise ConfigError(f"mavlink.key_file {path}: cannot be read: {reason}") from None
     if not text:
         raise ConfigError(f"mavlink.key_file {path} is empty; write 64 hexadecimal digits or a passphrase into it")
     try:

@@ -19,7 +19,7 @@ from typing import Any
 
 import cv2
 
-from axialnav.fusion.live.camera_source import one_thread
+from axialnav.fusion.live.camera_source import settle_opencv
 from axialnav.fusion.live.cli import SWITCH_S
 from axialnav.fusion.live.node import Node
 from axialnav.fusion.live.recording import FlightRecording
@@ -188,7 +188,7 @@ def main() -> None:
     """Print the tables that are asked for, all if none is."""
     wanted = [word for word in sys.argv[1:] if not word.startswith("-")] or ["latency", "link", "bytes", "hour"]
     sys.setswitchinterval(SWITCH_S)
-    one_thread()
+    settle_opencv()
     load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
     sys.stdout.write(f"{machine()}; load of the machine {load}\n\n")
     with tempfile.TemporaryDirectory() as made:

@@ -200,10 +200,26 @@ def without_none(data: Any) -> Any:
         (["live", "--config", "nowhere.toml"], 2, "nowhere.toml: cannot be read"),
         (["camera", "--conf", "x"], 2, "--config"),
         (["camera", "--config", "vehicle.toml"], 2, "the vehicle file has no [camera]"),
+        (["camera", "--config", "vehicle.toml", "--seconds", "-1"], 2, "more than 0"),
+        (["camera", "--config", "nothing_there.toml"], 2, "camera.source nothing.avi: No such file or directory"),
+        (["live", "--config", "nothing_there.toml"], 2, "camera.source nothing.avi: No such file or directory"),
+        (["live", "--config", "backwards.toml"], 2, "filter.sensor.imu0.rate_hz must be more than 0, got -3"),
+        (["live", "--config", "no_link.toml"], 2, "mavlink.link must be udpin:"),
+        (["live", "--config", "no_key.toml"], 2, "mavlink.key_file nowhere: cannot be read: No such file"),
     ],
 )
 def test_what_is_wrong_is_one_line(words: list[str], code: int, text: str, tmp_path: Path) -> None:
-    (tmp_path / "vehicle.toml").write_text('[filter.sensor.imu0]\nkind = "imu"\n')
+    imu = '[filter.sensor.imu0]\nkind = "imu"\n'
+    cam = '[filter.sensor.cam0]\nkind = "camera"\nresolution = [64, 48]\nintrinsics = [60.0, 60.0, 32.0, 24.0]\n'
+    wall = 'surface = "wall"\n[filter.surface.wall]\nnormal = [0.0, -1.0, 0.0]\n'
+    for name, content in {
+        "vehicle": imu,
+        "nothing_there": f'[camera]\nsource = "nothing.avi"\n{imu}{cam}{wall}',
+        "backwards": f"{imu}rate_hz = -3\n",
+        "no_link": f'[mavlink]\nlink = "tcp:1.2.3.4:5"\n{imu}',
+        "no_key": f'[mavlink]\nlink = "udpin:127.0.0.1:0"\nkey_file = "nowhere"\n{imu}',
+    }.items():
+        (tmp_path / f"{name}.toml").write_text(content)
     command = [sys.executable, "-m", "axialnav", *words]
     ended = subprocess.run(
         command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False

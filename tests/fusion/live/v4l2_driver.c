@@ -78,6 +78,13 @@ static int connect_camera(void) {
 OPEN(open)
 OPEN(open64)
 
+int close(int file) {
+    static int (*real)(int);
+    if (!real) real = dlsym(RTLD_NEXT, "close");
+    if (file >= 0 && file == device) device = -1;
+    return real(file);
+}
+
 static size_t bytes(void) { return (size_t)width * height * 2; }
 
 static void *buffer_at(off_t offset) { return buffers[offset / 4096]; }
