@@ -20,8 +20,9 @@ from axialnav.estimators.spectral.blocks import block_notches, blocky
 from axialnav.estimators.spectral.fit import Fit, best_displacement, free_blur
 from axialnav.estimators.spectral.picture import Spectra, composite_rows, row_window
 from axialnav.estimators.spectral.shapes import comb, pair_lags
+from axialnav.estimators.spectral.steps import surely_even
 from axialnav.estimators.spectral.strips import wall_spectra
-from axialnav.estimators.spectral.verdict import why_refused, why_unusable
+from axialnav.estimators.spectral.verdict import may_be_uneven, why_refused, why_unusable
 from axialnav.estimators.spectral.whittle import SHIFT
 
 LEAST_FRAMES = 2
@@ -77,6 +78,8 @@ def fit_composite(frames: Frames, frame_period_s: float, exposure_s: float | Non
     reason = why_refused(fit, displacement, SHORTEST_PX)
     if not reason and fit.excess > PLAIN_EXCESS and comb_share(stack, spectra, displacement) < MIN_COMB:
         reason = MotionReason.PERIODIC
+    if not reason and may_be_uneven(fit) and not surely_even(stack):
+        reason = MotionReason.AMBIGUOUS
     if reason:
         return refused(reason, signed=False, window_s=span_s, method="composite")
     sigma = math.hypot(fit.sigma_px, SYSTEMATIC * displacement)

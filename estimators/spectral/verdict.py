@@ -31,9 +31,9 @@ def _same(a: Image, b: Image) -> bool:
 def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
     """Why a fit is not believed; "" if it is.
 
-    It must beat every other length, no motion among them, and a missing frame, which would change the length by a fifth
-    or more; show light beyond its first dark line; and be longer than what can be told from a lens.  What the model
-    does not explain makes likelihoods count less.
+    It must beat every other length, no motion among them; not be explained better by a missing frame, which would
+    change the length by a fifth or more; show light beyond its first dark line; and be longer than what can be told
+    from a lens.  What the model does not explain makes likelihoods count less.
     """
     if not (math.isfinite(fit.sigma_px) and math.isfinite(length_px)):
         return MotionReason.AMBIGUOUS
@@ -42,8 +42,13 @@ def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
         return MotionReason.AMBIGUOUS
     if fit.excess > MAX_EXCESS:
         return MotionReason.MODEL
-    if fit.gap > -MIN_EVEN * deflated - EVEN_SHARE * fit.margin:
-        return MotionReason.UNEVEN if fit.gap > MAX_GAP * deflated else MotionReason.AMBIGUOUS
+    if fit.gap > MAX_GAP * deflated:
+        return MotionReason.UNEVEN
     if length_px < shortest_px:
         return MotionReason.SHORT
     return MotionReason.SIGMA if fit.sigma_px > min(MAX_SHARE * length_px, MAX_SIGMA_PX) else ""
+
+
+def may_be_uneven(fit: Fit) -> bool:
+    """Whether the spectrum alone does not rule out that a frame is missing."""
+    return fit.gap > -MIN_EVEN * max(1.0, fit.excess) - EVEN_SHARE * fit.margin
