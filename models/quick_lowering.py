@@ -36,9 +36,9 @@ from axialnav.models.pieces import (
     total,
     word,
 )
+from axialnav.models.quick_passes import POWERS
 
 FLOAT, INT = types.float64, types.int64
-POWERS = operator.pow, operator.ipow
 
 
 Write = Callable[[Any, Any, Any], Any]  # from the builder and two operands
@@ -161,9 +161,7 @@ class QuickLower(lowering.Lower):  # type: ignore[misc]
         write = ARITHMETIC.get((expr.fn, kind)) if signature.args[1] == kind else None
         if write is None:
             return None
-        x, y = (
-            self._convert(self._raw(v.name), self.typeof(v.name), kind) for v in (expr.lhs, expr.rhs)
-        )  # fmt: skip
+        x, y = (self._convert(self._raw(v.name), self.typeof(v.name), kind) for v in (expr.lhs, expr.rhs))
         return self._convert(write(self.builder, x, y), signature.return_type, to)
 
     _inplace_binop = _binop

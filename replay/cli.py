@@ -77,6 +77,7 @@ def _forward(verb: str) -> Callable[..., int]:
     """A verb that flies, whose own parser needs none of the libraries of this one."""
 
     def run(*words: Annotated[str, Parameter(allow_leading_hyphen=True)]) -> int:
+        """Hand the words to the parser of the verb; its help is the verb's purpose, not this."""
         return on_board.main([verb, *words])
 
     return run

@@ -114,15 +114,11 @@ def _check_camera(mission: Mission) -> None:
             f"per frame, beyond the camera's reach of {limit:.0f}; fly at most {fastest:.2f} m/s, farther from the "
             "wall, or raise camera.rate_hz"
         )
-    if not camera.exposure_s <= 1.0 / camera.rate_hz:
-        raise ConfigError(
-            f"mission {mission.name}: camera.exposure_s = {camera.exposure_s:g} is longer than the frame period of "
-            f"{1.0 / camera.rate_hz:.4g} s; shorten it"
-        )
-    if not camera.readout_s <= 1.0 / camera.rate_hz:
-        raise ConfigError(
-            f"mission {mission.name}: camera.readout_s = {camera.readout_s:g} is longer than the frame period of "
-            f"{1.0 / camera.rate_hz:.4g} s; shorten it"
-        )
+    for name, takes_s in (("exposure_s", camera.exposure_s), ("readout_s", camera.readout_s)):
+        if not takes_s <= 1.0 / camera.rate_hz:
+            raise ConfigError(
+                f"mission {mission.name}: camera.{name} = {takes_s:g} is longer than the frame period of "
+                f"{1.0 / camera.rate_hz:.4g} s; shorten it"
+            )
     if camera.width_px % 2:
         raise ConfigError(f"mission {mission.name}: camera.width_px is {camera.width_px}, must be even; add one")
