@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import Frames, check_times, frame_stack, luma
+from axialnav.estimators.frames import Frames, frame_stack
 from axialnav.estimators.lens import CentralView
 from axialnav.estimators.methods import LEAST_FRAMES, estimate_stack, known_method
+from axialnav.estimators.options import check_prior, check_times
 from axialnav.estimators.result import MotionEstimate, MotionReason
 from axialnav.estimators.streaming import MotionEstimator
 from axialnav.models.rig import Camera
@@ -57,16 +58,6 @@ def estimate_motion(
     """
     known_method(method)
     check_times(frame_period_s, exposure_s)
-    _check_prior(prior_px)
-    if camera is not None:
-        view = CentralView(camera, None)
-        frames = [view(luma(frame)) for frame in frames]
-    stack = frame_stack(frames, axis, LEAST_FRAMES[method])
+    check_prior(prior_px)
+    stack = frame_stack(frames, axis, LEAST_FRAMES[method], method, CentralView(camera, None))
     return estimate_stack(stack, method, frame_period_s, exposure_s, prior_px)
-
-
-def _check_prior(prior_px: tuple[float, float] | None) -> None:
-    if prior_px is None:
-        return
-    if len(prior_px) != 2 or not (abs(prior_px[0]) < 1e5 and 0.0 < prior_px[1] < 1e5):
-        raise FrameError(f"prior_px must be (displacement, sigma > 0) in px per frame, got {prior_px!r}")

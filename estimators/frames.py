@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
+from axialnav.estimators.options import MIN_SIDE_PX, check_axis, check_count
 from axialnav.estimators.result import MotionReason
 from axialnav.models.jit import kernel
 
 Image = NDArray[np.unsignedinteger[Any]]
 Frames = NDArray[np.generic] | Sequence[NDArray[np.generic]]
-MIN_SIDE_PX = 32
 MAX_SATURATED = 0.2
 DARK_DN = 1
 FULL_DN = 255
@@ -31,10 +30,12 @@ def luma(image: NDArray[np.generic]) -> Image:
     Raises
     ------
     FrameError
-        If the picture is not uint8 or uint16, has another shape, or is smaller than 32 x 32.
+        If the picture is not uint8 or uint16, has another shape or a mask, or is smaller than 32 x 32.
     """
     if not isinstance(image, np.ndarray):
         raise FrameError(f"a frame must be a numpy array, got {type(image).__name__}; decode it first")
+    if isinstance(image, np.ma.MaskedArray):
+        raise FrameError("a frame must be a plain array, got a masked one; cut a region of interest out instead")
     if image.dtype not in (np.uint8, np.uint16):
         raise FrameError(f"a frame must be uint8 or uint16, got {image.dtype}; hand in the camera's own numbers")
     if image.ndim == 3 and image.shape[2] in (1, 2, 3):
@@ -47,7 +48,9 @@ def luma(image: NDArray[np.generic]) -> Image:
     return cast(Image, image)
 
 
-def frame_stack(frames: Frames, axis: str, least: int) -> list[Image]:
+def frame_stack(
+    frames: Frames, axis: str, least: int, method: str, view: Callable[[Image], Image] | None = None
+) -> list[Image]:
     """Grey frames of one shape with the axis of motion along the rows.
 
     Parameters
@@ -58,38 +61,28 @@ def frame_stack(frames: Frames, axis: str, least: int) -> list[Image]:
         ``"x"`` (along the rows) or ``"y"`` (down the columns).
     least
         Smallest usable N.
+    method
+        Name of the method that needs so many.
+    view
+        What is done to every grey picture first; None: nothing.
 
     Raises
     ------
     FrameError
-        If there are too few frames, their shapes or types differ, or the axis has another name.
+        If these are no frames, too few or too many, their shapes or types differ, or the axis has another name.
     """
-    if axis not in ("x", "y"):
-        raise FrameError(f"axis must be 'x' (along the rows) or 'y' (down the columns), got {axis!r}")
-    if len(frames) < least:
-        raise FrameError(f"this method needs at least {least} frames, got {len(frames)}; collect more before asking")
+    check_axis(axis)
+    if not isinstance(frames, Sequence) and np.ndim(frames) < 3:
+        what = f"shape {frames.shape}" if isinstance(frames, np.ndarray) else type(frames).__name__
+        raise FrameError(f"frames must be an array (N, h, w) or a list of pictures, got {what}")
+    check_count(len(frames), least, method)
     stack = [luma(frame) for frame in frames]
     kinds = {(frame.shape, frame.dtype.name) for frame in stack}
     if len(kinds) != 1:
         raise FrameError(f"all frames must have one size and one type, got {sorted(map(str, kinds))}")
+    if view is not None:
+        stack = [view(frame) for frame in stack]
     return stack if axis == "x" else [np.ascontiguousarray(frame.T) for frame in stack]
-
-
-def check_times(frame_period_s: float, exposure_s: float | None) -> None:
-    """Refuse a frame period or an exposure that cannot be.
-
-    Raises
-    ------
-    FrameError
-        If the period is not positive and finite, or the exposure not within 0 and the period.
-    """
-    if not 0.0 < frame_period_s < math.inf:
-        raise FrameError(f"frame_period_s must be positive and finite, got {frame_period_s!r}")
-    if exposure_s is not None and not 0.0 <= exposure_s <= frame_period_s * 1.001:
-        raise FrameError(
-            f"exposure_s must lie within 0 and the frame period of {frame_period_s:.6g} s, got {exposure_s!r}; "
-            "pass None if it is unknown"
-        )
 
 
 def unusable(image: Image) -> str:

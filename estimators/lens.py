@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import MIN_SIDE_PX, Image
+from axialnav.estimators.frames import Image
+from axialnav.estimators.options import Region, check_camera, check_region
 from axialnav.models.camera import RADTAN, pinhole_pixels, undistorted_grid
 from axialnav.models.rig import Camera
 
@@ -31,15 +32,16 @@ class CentralView:
     Raises
     ------
     FrameError
-        If the region is too small or the distortion model unknown.
+        If the region cannot be, does not lie within the camera's picture, or the distortion model is unknown.
     """
 
-    def __init__(self, camera: Camera | None, roi: tuple[int, int, int, int] | None) -> None:
-        if roi is not None and (min(roi[:2]) < 0 or min(roi[2:]) < MIN_SIDE_PX):
-            raise FrameError(
-                f"roi must be (row, column, rows, columns) with sides of at least {MIN_SIDE_PX} px, got {roi}"
-            )
+    def __init__(self, camera: Camera | None, roi: Region | None) -> None:
+        check_camera(camera)
+        check_region(roi)
         self._roi = roi
+        self._size = None if camera is None else (camera.resolution[1], camera.resolution[0])
+        if self._size is not None:
+            self._require_region(*self._size)
         self._maps: tuple[NDArray[np.int16], NDArray[np.uint16]] | None = None
         if camera is not None and camera.distortion_model not in NONE and any(camera.distortion_coefficients):
             self._maps = _maps(camera, roi)
@@ -50,21 +52,34 @@ class CentralView:
         Raises
         ------
         FrameError
-            If the frame does not contain the region.
+            If the frame is not of the camera's resolution, or does not contain the region.
         """
-        if self._roi is not None:
-            row, column, rows, columns = self._roi
-            if row + rows > image.shape[0] or column + columns > image.shape[1]:
-                raise FrameError(f"roi {self._roi} does not fit into a frame of {image.shape[0]} x {image.shape[1]} px")
+        height, width = image.shape
+        if self._size is not None and (height, width) != self._size:
+            raise FrameError(
+                f"the frame is {width} x {height} px, the camera's resolution {self._size[1]} x {self._size[0]}; "
+                "describe the camera in the mode it runs in"
+            )
+        self._require_region(height, width)
         if self._maps is not None:
             view: Image = cv2.remap(image, *self._maps, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
             return view
         if self._roi is not None:
+            row, column, rows, columns = self._roi
             return image[row : row + rows, column : column + columns]
         return image
 
+    def _require_region(self, height: int, width: int) -> None:
+        if self._roi is None:
+            return
+        row, column, rows, columns = self._roi
+        if row + rows > height or column + columns > width:
+            raise FrameError(
+                f"roi {self._roi} does not fit into a frame of {height} x {width} px; choose a smaller one"
+            )
 
-def _maps(camera: Camera, roi: tuple[int, int, int, int] | None) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+
+def _maps(camera: Camera, roi: Region | None) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
     if camera.distortion_model not in RADTAN_NAMES:
         raise FrameError(
             f"distortion model {camera.distortion_model!r} is not known; choose {RADTAN!r} or 'none', "

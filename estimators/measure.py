@@ -47,6 +47,7 @@ SURELY_MOVING_PX = 2.0 * STATIC_PX  # slower motion is checked for patterns of t
 STRETCH_WINDOWS = 4  # a wall's slant changes slowly
 PRIOR_SIGMAS = 5.0
 PRIOR_MARGIN_PX = 1.0
+LEAST_STEPS = 3  # of the search: a top between two neighbours
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,8 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     frames = len(window.order)
     span_s = (frames - 1) * options.frame_period_s
     grid = search_grid(window.coarse.band.length, frames, options.prior_px)
+    if len(grid) < LEAST_STEPS:
+        return refused(MotionReason.PRIOR_OUTSIDE, signed=True, window_s=span_s, method="joint")
     found = window.coarse.profiles(window.order, grid)
     choice = choose(found, options.consensus)
     votes = (int(choice.agree.sum()), BANDS)

@@ -29,7 +29,7 @@ def known_method(method: str) -> None:
     FrameError
         With the list of names.
     """
-    if method not in LEAST_FRAMES:
+    if not isinstance(method, str) or method not in LEAST_FRAMES:
         raise FrameError(f"there is no method named {method!r}; choose from {', '.join(LEAST_FRAMES)}")
 
 

@@ -18,6 +18,7 @@ class MotionReason(StrEnum):
     AMBIGUOUS = "no displacement stands out from the noise"
     PERIODIC = "the wall repeats itself, several displacements fit alike: pass a prior that tells them apart"
     PRIOR_BORDER = "the best displacement lies at the border of the range that the prior allows"
+    PRIOR_OUTSIDE = "the prior expects more motion than these frames can show: they would hardly overlap"
     BANDS = "the row bands disagree: something that does not move with the wall fills too much of the picture"
     STATIC = "only a pattern fixed to the camera repeats from frame to frame"
     UNEVEN = "the frames are not evenly spaced along the motion: one was dropped or repeated, or the camera shook"

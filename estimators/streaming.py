@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import Image, check_times, luma, same_picture, unusable
+from axialnav.estimators.frames import Image, luma, same_picture, unusable
 from axialnav.estimators.lens import CentralView
 from axialnav.estimators.measure import JointOptions, measure_joint
 from axialnav.estimators.methods import LEAST_FRAMES, estimate_stack, known_method
+from axialnav.estimators.options import (
+    Prior,
+    Region,
+    check_axis,
+    check_count,
+    check_exposure,
+    check_prior,
+    check_stamp,
+    check_times,
+)
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.window import FrameWindow
 from axialnav.models.rig import Camera
 
-GAP = 1.5  # frame periods
+GAP = 1.5  # usual steps between two stamps
+RECENT_STEPS = 16
 MIN_PERIOD_NS = 100_000
 
 
@@ -27,9 +37,8 @@ class MotionEstimator:
     Parameters
     ----------
     camera
-        The camera: its ``rate_hz`` says what a gap is (without it, the shortest distance between two frames so far
-        does), its ``exposure_s`` stands in for frames that do not tell theirs, its distortion is removed.  None:
-        nothing is known.
+        The camera: its ``rate_hz`` says what a gap is until the stamps themselves do, its ``exposure_s`` stands in for
+        frames that do not tell theirs, its distortion is removed.  None: nothing is known.
     frames
         Frames per estimate.
     method
@@ -44,12 +53,14 @@ class MotionEstimator:
     Raises
     ------
     FrameError
-        If the number of frames is too small for the method, or an option is unknown.
+        If the number of frames is too small for the method or too large, or an option is not what it can be.
 
     Notes
     -----
     Estimates belong to the middle of their window (``t_ns``), not to the last frame.  A gap in the stamps empties the
-    ring: the frames before it and after it are not evenly spaced.  The estimate that follows says so in ``note``.
+    ring: the frames before it and after it are not evenly spaced.  The estimate that follows says so in ``note``.  A
+    gap is a step half as long again as the usual one, the lower quartile of the last 16: one short step or some lost
+    frames do not change it, but a camera that slows down in the dark is followed within as many frames.
     """
 
     def __init__(
@@ -59,21 +70,20 @@ class MotionEstimator:
         method: str = "joint",
         *,
         axis: str = "x",
-        roi: tuple[int, int, int, int] | None = None,
+        roi: Region | None = None,
         undistort: bool = True,
     ) -> None:
         known_method(method)
-        if frames < LEAST_FRAMES[method]:
-            raise FrameError(f"method {method!r} needs at least {LEAST_FRAMES[method]} frames, got {frames}")
-        if axis not in ("x", "y"):
-            raise FrameError(f"axis must be 'x' (along the rows) or 'y' (down the columns), got {axis!r}")
+        check_count(frames, LEAST_FRAMES[method], method)
+        check_axis(axis)
         self._camera, self._frames, self._method, self._axis = camera, frames, method, axis
         self._view = CentralView(camera if undistort else None, roi)
         self._window: FrameWindow | None = None
         self._stack: deque[Image] = deque(maxlen=frames)
         self._stamps: deque[int] = deque(maxlen=frames)
         self._reasons: deque[str] = deque(maxlen=frames)
-        self._period_ns = 1e9 / camera.rate_hz if camera is not None and camera.rate_hz else math.inf
+        nominal = [1e9 / camera.rate_hz] if camera is not None and camera.rate_hz else []
+        self._steps_ns: deque[float] = deque(nominal, maxlen=RECENT_STEPS)
         self._note = ""
         self._windows = 0
 
@@ -82,9 +92,9 @@ class MotionEstimator:
         t_ns: int,
         image: NDArray[np.generic],
         exposure_s: float | None = None,
-        prior_px: tuple[float, float] | None = None,
+        prior_px: Prior | None = None,
     ) -> MotionEstimate | None:
-        """Take in a frame; return an estimate as soon as the ring is full.
+        """Take in a frame; return an estimate as soon as the ring is full and the frame period known.
 
         Parameters
         ----------
@@ -100,17 +110,18 @@ class MotionEstimator:
         Raises
         ------
         FrameError
-            If the stamp does not come after the previous one, or the frame cannot be used or has changed its size.
+            If the stamp does not come after the previous one, the frame cannot be used or has changed its size, or the
+            exposure or the prior cannot be.
         """
         grey: Image = self._view(luma(image))
         if self._axis == "y":
             grey = np.ascontiguousarray(grey.T)
         self._check_stamp(t_ns)
         exposure_s = exposure_s if exposure_s is not None else self._camera.exposure_s if self._camera else None
-        if exposure_s is not None and not exposure_s >= 0.0:
-            raise FrameError(f"exposure_s must not be negative, got {exposure_s!r} at t_ns={t_ns}")
+        check_exposure(exposure_s, t_ns)
+        check_prior(prior_px)
         self._take(t_ns, grey)
-        if len(self._stamps) < self._frames:
+        if len(self._stamps) < self._frames or not self._steps_ns:
             return None
         estimate = self._estimate(exposure_s, prior_px)
         middle = (self._stamps[0] + self._stamps[-1]) // 2
@@ -118,8 +129,7 @@ class MotionEstimator:
         return estimate.stamped(middle, note)
 
     def _check_stamp(self, t_ns: int) -> None:
-        if not isinstance(t_ns, int | np.integer):
-            raise FrameError(f"t_ns must be an integer number of nanoseconds, got {t_ns!r}")
+        check_stamp(t_ns)
         if not self._stamps:
             return
         step = int(t_ns) - self._stamps[-1]
@@ -128,11 +138,13 @@ class MotionEstimator:
                 f"frame at t_ns={t_ns} does not come after the one at {self._stamps[-1]}; "
                 "push frames in the order of their stamps, or make a new estimator after a clock was set"
             )
-        if step > GAP * self._period_ns:
+        if self._steps_ns and step > GAP * self._usual_step_ns():
             self._note = f"gap of {step / 1e6:.1f} ms before t_ns={t_ns}: the ring was emptied"
             self._forget()
-        elif self._camera is None or not self._camera.rate_hz:
-            self._period_ns = min(self._period_ns, float(step))
+        self._steps_ns.append(float(step))
+
+    def _usual_step_ns(self) -> float:
+        return sorted(self._steps_ns)[len(self._steps_ns) // 4]
 
     def _forget(self) -> None:
         self._stamps.clear()
@@ -165,11 +177,10 @@ class MotionEstimator:
                 "make a new estimator for another picture size"
             )
 
-    def _estimate(self, exposure_s: float | None, prior_px: tuple[float, float] | None) -> MotionEstimate:
+    def _estimate(self, exposure_s: float | None, prior_px: Prior | None) -> MotionEstimate:
         span = self._stamps[-1] - self._stamps[0]
-        period_s = span / (len(self._stamps) - 1) / 1e9 if span else self._period_ns / 1e9
-        if exposure_s is not None and math.isfinite(period_s):
-            check_times(period_s, exposure_s)
+        period_s = span / (len(self._stamps) - 1) / 1e9 if span else self._usual_step_ns() / 1e9
+        check_times(period_s, exposure_s)
         if self._method != "joint":
             return estimate_stack(list(self._stack), self._method, period_s, exposure_s)
         reason = next((why for why in self._reasons if why), "")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-MIN_SIDE_PX = 32
+from axialnav.estimators.options import MIN_SIDE_PX
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.frames import Frames, check_times, frame_stack
+from axialnav.estimators.frames import Frames, frame_stack
+from axialnav.estimators.options import check_times
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.rows import bin_height
 from axialnav.estimators.spectral.blocks import block_notches, blocky
@@ -58,7 +59,7 @@ def fit_composite(frames: Frames, frame_period_s: float, exposure_s: float | Non
         If frames or times are not what this function takes.
     """
     check_times(frame_period_s, exposure_s)
-    stack = frame_stack(frames, "x", LEAST_FRAMES)
+    stack = frame_stack(frames, "x", LEAST_FRAMES, "composite")
     span_s = (len(stack) - 1) * frame_period_s
     reason = why_unusable(stack)
     if reason:

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from axialnav.estimators.frames import Frames, check_times, frame_stack
+from axialnav.estimators.frames import Frames, frame_stack
+from axialnav.estimators.options import check_times
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.rows import bin_height
 from axialnav.estimators.spectral.fit import best_blur
@@ -46,7 +47,7 @@ def fit_single(
         If frames or times are not what this function takes.
     """
     check_times(frame_period_s, exposure_s)
-    stack = frame_stack(frames, "x", 1)
+    stack = frame_stack(frames, "x", 1, "single")
     if not exposure_s:
         return refused(MotionReason.NO_EXPOSURE, signed=False, window_s=0.0, method="single")
     reason = why_unusable(stack)

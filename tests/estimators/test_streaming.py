@@ -39,6 +39,30 @@ def test_a_gap_empties_the_ring_and_the_next_estimate_says_so() -> None:
     assert "gap of 133" in answers[5].note
 
 
+@pytest.mark.parametrize("camera", [CAMERA, None], ids=["rate known", "rate unknown"])
+def test_a_camera_that_slows_down_in_the_dark_is_followed(camera: Camera | None) -> None:
+    """GIVEN 30 frames per second WHEN the exposure halves the rate THEN gaps are told, then motion again."""
+    frames = rendered(3.0, 8, frames=40).frames
+    estimator = MotionEstimator(camera, frames=2)
+    stamps = [k * PERIOD_NS for k in range(10)] + [(9 + 2 * k) * PERIOD_NS for k in range(1, 16)]
+    answers = [estimator.push(t, frames[t // PERIOD_NS]) for t in stamps]
+    assert all(answer is not None for answer in answers[1:10])
+    assert answers[10] is None
+    followed = [answer for answer in answers[11:] if answer is not None]
+    assert len(followed) >= 2
+    assert "gap of 66.7 ms" in followed[0].note
+    assert [answer.note for answer in followed[1:]] == [""] * (len(followed) - 1)
+    assert followed[-1].displacement_px == pytest.approx(6.0, abs=0.1)
+
+
+def test_one_short_step_does_not_make_every_other_a_gap() -> None:
+    frames = rendered(3.0, 9, frames=12).frames
+    estimator = MotionEstimator(frames=2)
+    stamps = [k * PERIOD_NS - (PERIOD_NS // 2 if k == 3 else 0) for k in range(12)]
+    answers = [estimator.push(t, frame) for t, frame in zip(stamps, frames, strict=True)]
+    assert all(answer is not None for answer in answers[-6:])
+
+
 @pytest.mark.parametrize("stamp", [0, -5, 10])
 def test_stamps_that_do_not_advance_are_an_error(stamp: int) -> None:
     frames = rendered(6.0, 3, frames=2).frames
@@ -50,7 +74,7 @@ def test_stamps_that_do_not_advance_are_an_error(stamp: int) -> None:
 
 def test_another_picture_size_or_a_bad_exposure_is_an_error() -> None:
     frames = rendered(6.0, 4, frames=2).frames
-    estimator = MotionEstimator(CAMERA, frames=2)
+    estimator = MotionEstimator(frames=2)
     estimator.push(0, frames[0])
     with pytest.raises(FrameError, match="make a new estimator"):
         estimator.push(PERIOD_NS, frames[1][:200])

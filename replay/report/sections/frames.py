@@ -82,7 +82,7 @@ def _spectrum(moment: Moment) -> Figure:
     from axialnav.estimators.frames import frame_stack
     from axialnav.estimators.spectral.picture import composite_rows, spectra_of
 
-    spectra = spectra_of(composite_rows(frame_stack(moment.frames, "x", 2)), 1.0)
+    spectra = spectra_of(composite_rows(frame_stack(moment.frames, "x", 2, "composite")), 1.0)
     power = 10.0 * np.log10(np.maximum(spectra.mean, 1e-12))
     power -= power.max()
     trace: Trace = {
