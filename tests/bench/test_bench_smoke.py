@@ -5,12 +5,16 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from axialnav.replay.flight import load_flight
 from axialnav.replay.sample_flights import sample_flight_path
 from tests.bench import bench_fusion
 from tests.bench.bench_flights import tables
 from tests.bench.flights import DEFAULT, PLAIN, Case
 from tests.bench.slider import slider_table
+from tests.bench.slider_scene import ripple
 
 SAMPLE = sample_flight_path()
 
@@ -35,6 +39,15 @@ def test_the_flight_tables_show_a_limit_that_is_kept_and_one_that_is_not() -> No
 def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
     assert tables((Case("nowhere"),), tmp_path) == f"skipped: nowhere is not in {tmp_path}"
     assert slider_table(tmp_path) == f"skipped: davis_slider_far is not in {tmp_path}"
+
+
+def test_a_ripple_of_the_slider_is_told_by_its_other_turns_and_noise_is_not() -> None:
+    frame, noise = np.arange(120.0), np.random.default_rng(1).normal(0.0, 0.01, (2, 120))
+    kick = 0.08 * np.exp(-0.5 * (((frame % 8.8) - 4.0) / 0.8) ** 2)
+    period, told = ripple(kick - kick.mean() + noise[0])
+    assert period == pytest.approx(8.8, abs=0.05)
+    assert np.var(kick - told) < 0.2 * np.var(kick)
+    assert np.var(noise[1] - ripple(noise[1])[1]) > 0.8 * np.var(noise[1])
 
 
 def test_the_speed_tables_have_a_positive_time_in_every_row() -> None:
