@@ -7,7 +7,9 @@ from collections.abc import Callable
 from importlib import import_module
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from axialnav.estimators.baselines.reading import BlurReading
 from axialnav.estimators.errors import FrameError
 from axialnav.estimators.frames import Image
 from axialnav.estimators.measure import JointOptions, measure_joint
@@ -15,6 +17,7 @@ from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.spectral import fit_composite, fit_single
 from axialnav.estimators.spectral.verdict import why_unusable
 from axialnav.estimators.window import FrameWindow
+from axialnav.models.camera import CompositeBlur, ExposureBlur
 
 BASELINES = ("stripes", "darkline", "dct", "cepstrum")
 LEAST_FRAMES = {"joint": 2, "composite": 2, "single": 1, **dict.fromkeys(BASELINES, 1)}
@@ -59,7 +62,7 @@ def estimate_stack(
 
 def _baseline(stack: list[Image], method: str, frame_period_s: float, exposure_s: float | None) -> MotionEstimate:
     """A published method on the composite (its length is ``N d``), or on the frame if there is one."""
-    read: Callable[[object], object] = getattr(
+    read: Callable[[ArrayLike], BlurReading] = getattr(
         import_module(f"axialnav.estimators.baselines.{method}"), f"{method}_length"
     )
     frames = len(stack)
@@ -67,9 +70,11 @@ def _baseline(stack: list[Image], method: str, frame_period_s: float, exposure_s
     if frames == 1 and not exposure_s:
         return refused(MotionReason.NO_EXPOSURE, signed=False, window_s=0.0, method=method)
     reading = read(np.mean(stack, axis=0, dtype=np.float32) if frames > 1 else stack[0])
-    length, found, why = (getattr(reading, name) for name in ("length_px", "found", "reason"))
-    if not found:
-        return refused(why or MotionReason.MODEL, signed=False, window_s=window_s, method=method)
-    per_period = length / frames if frames > 1 else length * frame_period_s / (exposure_s or math.nan)
+    if not reading.found:
+        return refused(reading.reason, signed=False, window_s=window_s, method=method)
+    if frames > 1:
+        per_period = CompositeBlur(reading.length_px, frames, frame_period_s).displacement_px
+    else:
+        per_period = ExposureBlur(reading.length_px, exposure_s or math.nan).displacement_px(frame_period_s)
     sigma = BASELINE_SIGMA * per_period
     return MotionEstimate(per_period, sigma, math.nan, True, MotionReason.GOOD, False, window_s, method=method)

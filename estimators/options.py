@@ -96,7 +96,9 @@ def check_count(frames: int, least: int, method: str) -> None:
     if isinstance(frames, bool) or not isinstance(frames, int):
         raise FrameError(f"frames must be a whole number, got {frames!r}; choose {least} to {MOST_FRAMES}")
     if not least <= frames <= MOST_FRAMES:
-        raise FrameError(f"method {method!r} takes {least} to {MOST_FRAMES} frames, got {frames}; hand in so many")
+        raise FrameError(
+            f"method {method!r} takes {least} to {MOST_FRAMES} frames, got {frames}; collect more or leave some out"
+        )
 
 
 def check_axis(axis: str) -> None:

@@ -55,6 +55,10 @@ class ExposureBlur:
     def __post_init__(self) -> None:
         _require(self.length_px, self.exposure_s, "exposure_s")
 
+    def displacement_px(self, frame_period_s: float) -> float:
+        """Displacement per frame period [px], ``l T / t_e`` (equations 2 and 3)."""
+        return self.length_px * frame_period_s / self.exposure_s
+
 
 @dataclass(frozen=True, slots=True)
 class CompositeBlur:

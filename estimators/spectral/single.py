@@ -15,6 +15,7 @@ from axialnav.estimators.spectral.picture import Spectra, composite_rows
 from axialnav.estimators.spectral.strips import wall_spectra
 from axialnav.estimators.spectral.verdict import why_refused, why_unusable
 from axialnav.estimators.spectral.whittle import BLUR
+from axialnav.models.camera import ExposureBlur
 
 SHORTEST_PX = 3.0
 LOWEST_PX = 0.8  # lengths below the shortest are looked at, so that they can be recognised
@@ -65,10 +66,9 @@ def fit_single(
     reason = why_refused(fit, blur, SHORTEST_PX)
     if reason:
         return refused(reason, signed=False, window_s=exposure_s, method="single")
-    scale = frame_period_s / exposure_s
-    return MotionEstimate(
-        blur * scale, fit.sigma_px * scale, math.nan, True, MotionReason.GOOD, False, exposure_s, method="single"
-    )
+    displacement = ExposureBlur(blur, exposure_s).displacement_px(frame_period_s)
+    sigma = ExposureBlur(fit.sigma_px, exposure_s).displacement_px(frame_period_s)
+    return MotionEstimate(displacement, sigma, math.nan, True, MotionReason.GOOD, False, exposure_s, method="single")
 
 
 def averaged(spectra: list[Spectra]) -> Spectra:

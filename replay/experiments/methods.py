@@ -16,6 +16,7 @@ from axialnav.estimators.baselines.dct import dct_length
 from axialnav.estimators.baselines.reading import BlurReading
 from axialnav.estimators.baselines.stripes import stripes_length
 from axialnav.estimators.estimate import estimate_motion
+from axialnav.models.camera import CompositeBlur, ExposureBlur
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,9 @@ def one_frame(method: Callable[[ArrayLike], BlurReading]) -> Measure:
     def measure(window: Window) -> tuple[float, ...]:
         """From the middle frame."""
         reading = method(window.frames[len(window.frames) // 2])
-        return (reading.length_px * window.frame_period_s / window.exposure_s,)
+        if not reading.found:
+            return (math.nan,)
+        return (ExposureBlur(reading.length_px, window.exposure_s).displacement_px(window.frame_period_s),)
 
     return measure
 
@@ -47,7 +50,10 @@ def of_composite(method: Callable[[ArrayLike], BlurReading]) -> Measure:
 
     def measure(window: Window) -> tuple[float, ...]:
         """From the mean of all frames."""
-        return (method(composite_mean(window.frames)).length_px / len(window.frames),)
+        reading = method(composite_mean(window.frames))
+        if not reading.found:
+            return (math.nan,)
+        return (CompositeBlur(reading.length_px, len(window.frames), window.frame_period_s).displacement_px,)
 
     return measure
 
@@ -57,8 +63,8 @@ def of_composite_either_way(method: Callable[[ArrayLike], BlurReading]) -> Measu
 
     def measure(window: Window) -> tuple[float, ...]:
         """Both readings of the mean of all frames."""
-        length = method(composite_mean(window.frames)).length_px
-        return length / len(window.frames), length
+        ridges = method(composite_mean(window.frames)).length_px
+        return *of_composite(method)(window), ridges
 
     return measure
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -116,6 +118,29 @@ def test_a_region_of_interest_and_a_lens_are_honoured() -> None:
 
     assert last(True) == pytest.approx(9.0, abs=0.05)
     assert abs(last(False) - 9.0) > 0.1
+
+
+@pytest.mark.parametrize("frames", [2, 5])
+def test_a_steady_stream_keeps_its_memory(frames: int) -> None:
+    """GIVEN a full ring THEN a push leaves nothing behind, and what it takes in between is less than one picture."""
+    pictures = rendered(6.0, 10, frames=40).frames
+    estimator = MotionEstimator(CAMERA, frames=frames)
+    for k in range(20):
+        estimator.push(k * PERIOD_NS, pictures[k], EXPOSURE_S)
+    kept, taken = [], []
+    tracemalloc.start(1)
+    try:
+        for k in range(20, 40):
+            before = tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            estimator.push(k * PERIOD_NS, pictures[k], EXPOSURE_S)
+            now, peak = tracemalloc.get_traced_memory()
+            kept.append(now - before)
+            taken.append(peak - before)
+    finally:
+        tracemalloc.stop()
+    assert sum(kept[4:]) < 8_000  # small numbers and caches of numpy's, 0.2 % of the ring
+    assert max(taken) < pictures[0].nbytes
 
 
 def test_other_methods_stream_too() -> None:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -34,6 +39,7 @@ def test_both_laws_agree_about_one_motion() -> None:
     assert exposure_law(exposure, FOCAL_PX, DISTANCE_M) == pytest.approx(speed)
     assert composite_law(composite, FOCAL_PX, DISTANCE_M) == pytest.approx(speed)
     assert composite.displacement_px == pytest.approx(displacement)
+    assert exposure.displacement_px(PERIOD_S) == pytest.approx(displacement)
 
 
 def test_the_laws_cannot_be_mixed() -> None:
@@ -43,6 +49,26 @@ def test_the_laws_cannot_be_mixed() -> None:
         composite_law(ExposureBlur(10.0, EXPOSURE_S), FOCAL_PX, DISTANCE_M)  # type: ignore[arg-type]
     with pytest.raises(TypeError):
         exposure_law(10.0, FOCAL_PX, DISTANCE_M)  # type: ignore[arg-type]
+
+
+def test_a_type_checker_refuses_to_mix_the_laws(tmp_path: Path) -> None:
+    """GIVEN each law with its own length, the other's and a bare number THEN mypy passes the first line only."""
+    source = tmp_path / "mix.py"
+    source.write_text(
+        "from axialnav.models.camera import CompositeBlur, ExposureBlur, composite_law, exposure_law\n"
+        "exposure_law(ExposureBlur(3.0, 0.01), 600.0, 2.0); composite_law(CompositeBlur(50.0, 5, 0.1), 600.0, 2.0)\n"
+        "exposure_law(CompositeBlur(50.0, 5, 0.1), 600.0, 2.0)\n"
+        "composite_law(ExposureBlur(3.0, 0.01), 600.0, 2.0)\n"
+        "exposure_law(3.0, 600.0, 2.0)\n"
+        "composite_law(50.0, 600.0, 2.0)\n"
+    )
+    root = Path(__file__).parents[2]
+    options = ["--cache-dir", os.devnull, "--config-file", os.devnull, "--follow-imports", "skip"]
+    command = [sys.executable, "-m", "mypy", *options, "axialnav/models/camera.py", str(source)]
+    printed = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False).stdout
+    said = [line.partition("mix.py:")[2] for line in printed.splitlines() if "mix.py:" in line]
+    assert [int(line.split(":")[0]) for line in said] == [3, 4, 5, 6]
+    assert all("incompatible type" in line for line in said)
 
 
 @pytest.mark.parametrize("length", [-1.0, float("nan"), float("inf")])
