@@ -10,7 +10,7 @@ from axialnav.estimators.measure import JointOptions, measure_joint
 from axialnav.estimators.refine import fit_frames
 from axialnav.estimators.window import FrameWindow
 from axialnav.replay.simulate.render import Rendering, dropped_frame
-from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered
+from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered, texture
 
 
 def measured(picture: Rendering, **options: object) -> MotionEstimate:
@@ -57,6 +57,28 @@ def test_drift_across_the_rows_is_seen_and_followed() -> None:
     estimate = estimate_motion(picture.frames, frame_period_s=PERIOD_S)
     assert estimate.cross_px == pytest.approx(2.0, abs=0.15)
     assert estimate.displacement_px == pytest.approx(9.0, abs=0.04)
+
+
+@pytest.mark.parametrize("displacement_px", [7, -23])
+def test_windows_follow_the_wall(displacement_px: int) -> None:
+    """GIVEN whole pixels of motion and no noise THEN all windows that follow show the same piece of wall."""
+    frames = [texture(120, 900, 1)[:, 300 - k * displacement_px :][:, :480] for k in range(5)]
+    window = FrameWindow(120, 480, 5, frames[0].dtype)
+    for frame in frames:
+        window.push(frame)
+    led, left = window.following(float(displacement_px)).total, window.following(0.0).total
+    assert np.abs(led.im).max() < 1e-4 * led.re.max()
+    assert np.abs(left.im).max() > 0.1 * left.re.max()
+
+
+def test_what_every_row_has_alike_is_no_wall_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """GIVEN columns with gains of their own and a faint wall THEN it takes the columns' level off to see its motion."""
+    pictures = [rendered(0.8, seed, contrast=0.03, camera={"column_pattern": 0.01}) for seed in (1, 2, 3)]
+    for picture in pictures:
+        assert measured(picture).displacement_px == pytest.approx(0.8, abs=0.03)
+    monkeypatch.setattr("axialnav.estimators.window.remove_level", lambda rows, smooth, means: None)
+    for picture in pictures:
+        assert measured(picture).displacement_px != pytest.approx(0.8, abs=0.5)
 
 
 def test_acceleration_is_fitted_where_it_shows_and_only_there() -> None:

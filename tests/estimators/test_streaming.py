@@ -143,6 +143,16 @@ def test_a_steady_stream_keeps_its_memory(frames: int) -> None:
     assert max(taken) < pictures[0].nbytes
 
 
+def test_a_stream_measures_the_blur_once_per_window_of_new_frames() -> None:
+    frames = rendered(24.0, 11, bright=True, contrast=0.1, frames=14).frames
+    estimator = MotionEstimator(CAMERA, frames=5)
+    answers = [estimator.push(k * PERIOD_NS, frame, EXPOSURE_S) for k, frame in enumerate(frames)]
+    kappa = np.array([answer.kappa for answer in answers if answer is not None])
+    told = np.isfinite(kappa)
+    assert told.tolist() == [k % 4 == 3 for k in range(10)]
+    np.testing.assert_allclose(kappa[told], 1.0, atol=0.1)
+
+
 def test_other_methods_stream_too() -> None:
     frames = rendered(20.0, 7, frames=5, bright=True, contrast=0.1).frames
     estimator = MotionEstimator(CAMERA, frames=5, method="composite")

@@ -16,7 +16,16 @@ from axialnav.estimators.baselines.dct import dct_length
 from axialnav.estimators.baselines.dips import null_ladder, prominent_dips
 from axialnav.estimators.baselines.reading import BlurReading
 from axialnav.estimators.baselines.stripes import binarised_spectrum, dark_lines, ladder, stripes_length
-from axialnav.replay.simulate.render import BRIGHT, DIM, Scene, Trajectory, Wall, photographic_wall, render_frames
+from axialnav.replay.simulate.render import (
+    BRIGHT,
+    DIM,
+    CameraModel,
+    Scene,
+    Trajectory,
+    Wall,
+    photographic_wall,
+    render_frames,
+)
 from axialnav.replay.simulate.textures import NAMES, load_texture
 
 Method = Callable[..., BlurReading]
@@ -69,6 +78,29 @@ def test_null_methods_cannot_read_a_short_blur(method: Method, wall: Wall) -> No
     scene = Scene(wall, 0.05, DIM, trajectory=Trajectory(5.0))
     readings = [method(render_frames(scene, 1, np.random.default_rng(s)).frames[0]) for s in range(4)]
     assert all(not r.found or abs(r.length_px - 1.5) > 0.3 for r in readings)
+
+
+def test_the_cepstrum_of_a_short_blur_is_the_textures_own(wall: Wall) -> None:
+    scene = Scene(wall, 0.1, BRIGHT, trajectory=Trajectory(6.7))
+    readings = [cepstrum_length(render_frames(scene, 1, np.random.default_rng(s)).frames[0]) for s in range(4)]
+    assert all(not r.found or abs(r.length_px - 2.0) > 0.4 for r in readings)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.__name__)
+def test_no_published_method_reads_a_long_composite(method: Method, wall: Wall) -> None:
+    """Five frames of 31 px look blurred over 155 px: the nulls are too near the texture's own low frequencies."""
+    scene = Scene(wall, 0.1, BRIGHT, trajectory=Trajectory(31.0))
+    composites = [composite_mean(render_frames(scene, 5, np.random.default_rng(s)).frames) for s in range(2)]
+    readings = [method(composite) for composite in composites]
+    assert all(not r.found or abs(r.length_px - 155.0) > 31.0 for r in readings)
+
+
+def test_a_composite_knows_no_direction_and_keeps_what_stands_still(wall: Wall) -> None:
+    scene = Scene(wall, 0.0, BRIGHT, CameraModel(pixel_pattern=0.02), Trajectory(6.7))
+    frames = render_frames(scene, 20, np.random.default_rng(6)).frames
+    np.testing.assert_array_equal(composite_mean(frames), composite_mean(frames[::-1]))
+    noise, mean = float(np.std(frames[0].astype(float) - frames[1])) / 2.0**0.5, composite_mean(frames)
+    assert noise / 20**0.5 < 0.3 * float(np.std(mean))
 
 
 def test_a_composite_has_the_blur_of_the_whole_window(wall: Wall) -> None:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from axialnav.estimators.spectral.blocks import block_notches, blocky
+from axialnav.estimators.spectral.composite import fit_composite
 from axialnav.estimators.spectral.picture import composite_rows, level_and_window, spectra_of
 from axialnav.estimators.spectral.strips import odd_strips, wall_rows, wall_spectra
-from tests.estimators.scenes import rendered, texture
+from tests.estimators.scenes import EXPOSURE_S, PERIOD_S, rendered, texture
 
 
 def test_the_composite_is_the_sum_of_all_frames_with_rows_in_bins() -> None:
@@ -55,3 +56,14 @@ def test_a_codec_is_recognised_by_its_blocks_and_its_comb_left_out() -> None:
     usable = block_notches(frequency, 640)
     assert not usable[np.isclose(frequency % 0.125, 0.0)].any()
     assert usable.mean() > 0.5
+
+
+@pytest.mark.parametrize("displacement_px", [2.3, 31.0])
+def test_without_its_notches_a_codec_silences_the_composite(
+    displacement_px: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = rendered(displacement_px, 1, bright=True, contrast=0.1, camera={"jpeg_quality": 80}).frames
+    estimate = fit_composite(frames, PERIOD_S, EXPOSURE_S)
+    assert estimate.displacement_px == pytest.approx(displacement_px, abs=0.08)
+    monkeypatch.setattr("axialnav.estimators.spectral.composite.blocky", lambda rows: False)
+    assert not fit_composite(frames, PERIOD_S, EXPOSURE_S).accepted
