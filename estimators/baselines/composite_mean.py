@@ -18,9 +18,9 @@ def composite_mean(frames: Sequence[ArrayLike] | NDArray[np.generic]) -> NDArray
     1 / (N d), bright ridges at multiples of 1 / d. Its apparent length is therefore ``N d``, not the ``d t_e / T`` of
     one exposure.
 
-    Known failure: the mean of the frames in reverse is the same picture, so that the sign is lost; whether ridges or dark
-    lines are read makes a factor N; noise falls with the root of N, but what stands still in the camera does not; a
-    dropped frame makes another comb, which looks much like a faster wall.
+    Known failure: the mean of the frames in reverse is the same picture, so that the sign is lost; whether ridges or
+    dark lines are read makes a factor N; noise falls with the root of N, but what stands still in the camera does not;
+    a dropped frame makes another comb, which looks much like a faster wall.
 
     Parameters
     ----------
