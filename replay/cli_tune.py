@@ -80,8 +80,8 @@ def load_all(paths: Sequence[Path], mapping: Path | None) -> list[Flight]:
     return [load_flight(path, mapping=mapping) for path in paths]
 
 
-def refuse_inputs(out: Path, inputs: tuple[Path | None, ...]) -> None:
-    """Never write over a file that was read.
+def refuse_inputs(out: Path, inputs: tuple[Path | None, ...], example: str = "tuned.toml") -> None:
+    """Never write over a file that was read; ``example`` is what a file may be called.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def refuse_inputs(out: Path, inputs: tuple[Path | None, ...]) -> None:
     if any(path is not None and path.exists() and out.exists() and path.samefile(out) for path in inputs):
         raise ConfigError(f"--out {out} is also an input; settings are never edited in place, choose another file")
     if out.is_dir():
-        raise ConfigError(f"--out {out} is a folder; name a file in it, like {out / 'tuned.toml'}")
+        raise ConfigError(f"--out {out} is a folder; name a file in it, like {out / example}")
     if out.name in {"flight.toml", "sensor.yaml", "data.csv"}:
         raise ConfigError(f"--out {out} would replace a part of a recorded flight; choose another name")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,6 +10,7 @@ from cyclopts import Parameter
 
 from axialnav.fusion.errors import ConfigError, FlightError
 from axialnav.replay.cli_output import emit, progress_bar
+from axialnav.replay.cli_tune import refuse_inputs, write_text
 
 NOT_EVALUATED = 3
 
@@ -25,7 +27,7 @@ def motion_command(
     undistort: Annotated[bool | None, Parameter(negative="--raw")] = None,
     out: Path | None = None,
     experiment: str | None = None,
-    seed: int = 1,
+    seed: int | None = None,
     trials: int | None = None,
 ) -> int:
     """Measure image motion in the frames of a flight and score it against the truth.
@@ -56,7 +58,7 @@ def motion_command(
         Run one of the paper's experiments on rendered walls instead: single-vs-composite, frames, calibration,
         field.
     seed
-        Of the experiment's random numbers.
+        Of the experiment's random numbers; 1 if not given.
     trials
         Windows per condition of the experiment; its own number if not given.
     """
@@ -65,12 +67,33 @@ def motion_command(
             raise ConfigError(
                 f"--experiment {experiment} renders its own walls and takes no flight; leave out {flight}"
             )
-        return _experiment(experiment, out or Path("runs") / experiment, seed, trials)
+        _refuse_options(
+            experiment,
+            method=method,
+            frames=frames,
+            camera=camera,
+            axis=axis,
+            distance_m=distance_m,
+            undistort=undistort,
+        )
+        return _experiment(experiment, out or Path("runs") / experiment, 1 if seed is None else seed, trials)
     if flight is None:
         raise ConfigError("motion needs a flight folder, or --experiment NAME")
+    if seed is not None or trials is not None:
+        raise ConfigError("--seed and --trials belong to an experiment; leave them out, or add --experiment NAME")
     return _measure(
         flight, out, method=method, frames=frames, camera=camera, axis=axis, distance_m=distance_m, undistort=undistort
     )
+
+
+def _refuse_options(experiment: str, **options: Any) -> None:
+    """An experiment brings its own methods and pictures: what was asked for besides would be ignored."""
+    usual = signature(motion_command).parameters
+    other = [f"--{name.replace('_', '-')}" for name, value in options.items() if value != usual[name].default]
+    if other:
+        raise ConfigError(
+            f"--experiment {experiment} brings its own methods and pictures; leave out {', '.join(other)}"
+        )
 
 
 def _measure(flight: Path, out: Path | None, **options: Any) -> int:
@@ -79,15 +102,18 @@ def _measure(flight: Path, out: Path | None, **options: Any) -> int:
     from axialnav.replay.motion import run_motion
     from axialnav.replay.motion_table import motion_summary
 
+    if out is not None:
+        refuse_inputs(out, (flight,), "motion.csv")
     recording = load_flight(flight)
     try:
         with progress_bar(f"motion {recording.name}") as progress:
             run = run_motion(recording, progress=progress, **options)
     except FrameError as error:
         raise _sorted_error(error) from error
-    if out is not None:
-        out.write_text(run.to_csv(), encoding="utf-8")
     emit(motion_summary(run))
+    if out is not None:
+        write_text(out, run.to_csv())
+        emit(f"written    {out}")
     return 0 if run.accepted().any() else NOT_EVALUATED
 
 

@@ -29,6 +29,10 @@ def test_an_experiment_prints_its_table_and_names_its_files(tmp_path: Path) -> N
         (("--experiment", "fig9"), "single-vs-composite"),
         (("a-flight", "--experiment", "frames"), "leave out a-flight"),
         (("--experiment", "frames", "--trials", "0"), "at least 1 trial"),
+        (("--experiment", "frames", "--method", "dct", "--distance-m", "2"), "leave out --method, --distance-m"),
+        (("a-flight", "--trials", "3"), "belong to an experiment"),
+        (("a-flight", "--out", "."), "is a folder"),
+        (("a-flight", "--out", "a-flight/mav0/cam0/data.csv"), "part of a recorded flight"),
     ],
 )
 def test_nonsense_is_a_usage_error_in_one_line(words: tuple[str, ...], says: str) -> None:

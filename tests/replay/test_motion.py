@@ -75,9 +75,12 @@ def test_unsigned_methods_are_scored_without_sign(flight: Path) -> None:
     assert result.mean_truth == pytest.approx(-DISPLACEMENT_PX, rel=1e-3)
 
 
-def test_the_table_counts_windows_and_the_csv_holds_every_one(flight: Path, tmp_path: Path) -> None:
+def test_the_table_counts_windows_and_the_csv_holds_every_one(
+    flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "motion.csv"
     assert main(["motion", str(flight), "--out", str(out)]) == 0
+    assert f"written    {out}" in capsys.readouterr().out
     lines = out.read_text().splitlines()
     assert lines[0].startswith("#timestamp [ns],window [s],displacement [px]")
     assert len(lines) == 1 + FRAMES - 4
