@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -102,6 +103,21 @@ def test_shot_noise_grows_with_the_light_and_stops_at_the_ends_of_the_scale() ->
     assert expose(np.full((64, 64), -1.0, dtype=np.float32), BRIGHT, rng).max() <= 1
 
 
+@pytest.mark.parametrize(("read_noise_e", "sigma_dn"), [(0.0, 1000**0.5 / 10), (50.0, 3500**0.5 / 10)])
+def test_shot_and_read_noise_add_in_electrons(read_noise_e: float, sigma_dn: float) -> None:
+    """1000 electrons at 10 per grey value; the rounding to 8 bits adds a twelfth."""
+    light = np.ones((300, 400), dtype=np.float32)
+    picture = expose(light, LightLevel(100.0, 10.0, read_noise_e), np.random.default_rng(11))
+    assert picture.std() == pytest.approx((sigma_dn**2 + 1.0 / 12.0) ** 0.5, rel=0.01)
+    assert picture.mean() == pytest.approx(100.0, abs=0.1)
+
+
+def test_gamma_bends_grey_values_between_black_and_white(noiseless: LightLevel) -> None:
+    light = np.linspace(0.05, 2.2, 64 * 64, dtype=np.float32).reshape(64, 64)
+    picture = expose(light, noiseless, np.random.default_rng(12), 2.2).astype(float)
+    np.testing.assert_allclose(picture, 255.0 * (light * 110.0 / 255.0) ** (1.0 / 2.2), atol=0.51)
+
+
 def test_equal_seeds_give_equal_bytes(wall: Wall) -> None:
     camera = CameraModel(width=320, height=128, pixel_pattern=0.01, jpeg_quality=80, gamma=2.2)
     disturbance = Disturbance(0.2, 100.0, 0.05, 0.5, ("gear", "cable"))
@@ -142,6 +158,8 @@ def test_fixed_pattern_and_vignette_stay_with_the_camera(wall: Wall, noiseless: 
     falloff = light_falloff(128, 320, 0.4, 0.0)
     assert falloff.mean() == pytest.approx(1.0, rel=1e-5)
     assert falloff[0, 0] / falloff[64, 160] == pytest.approx(0.6, abs=0.01)
+    spot = light_falloff(129, 321, 0.0, 1.5)
+    assert spot[64, 160] / spot[0, 0] == pytest.approx(2.5 / (1.0 + 1.5 * np.exp(-4.0)), rel=0.02)
     camera = CameraModel(width=320, height=128, pixel_pattern=0.01, vignette=0.3)
     frames = render_frames(Scene(wall, 0.0, noiseless, camera, Trajectory(9.0)), 2, np.random.default_rng(8)).frames
     assert (frames[0] != frames[1]).mean() < 0.001  # a value on the edge of two grey levels may round either way
@@ -162,6 +180,9 @@ def test_occluders_do_not_move(wall: Wall, noiseless: LightLevel, name: str) -> 
 def test_jpeg_leaves_its_block_grid(wall: Wall) -> None:
     camera = CameraModel(width=320, height=128, jpeg_quality=40)
     frame = render_frames(Scene(wall, 0.05, DIM, camera), 1, np.random.default_rng(10)).frames[0].astype(float)
+    raw = render_frames(Scene(wall, 0.05, DIM, SMALL), 1, np.random.default_rng(10)).frames[0]
+    coded = cv2.imencode(".jpg", raw, [cv2.IMWRITE_JPEG_QUALITY, 40])[1]
+    np.testing.assert_array_equal(frame, cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))
     steps = np.abs(np.diff(frame, axis=1)).mean(axis=0)
     assert steps[7::8].mean() > 1.15 * np.delete(steps, np.s_[7::8]).mean()
 
