@@ -146,11 +146,12 @@ def _butterfly(first: Plane, second: Plane, difference: Plane, total: Plane) -> 
 
 @kernel
 def remove_level(rows: Plane, smooth: Index, means: Plane) -> None:
-    """Take the level of every column off the smooth rows: the median over five bands of its mean in the band.
+    """Take the level of every column, then that of every row, off the smooth rows.
 
-    It is where columns of the sensor, vignettes and upright objects fixed to the camera live, and a wall that moves
-    leaves almost nothing of itself there.  A plain mean would smear an object in one band over all rows.  Differences
-    of rows hold none of it.
+    The level of a column is the median over five bands of its mean in the band.  It is where columns of the sensor,
+    vignettes and upright objects fixed to the camera live, and a wall that moves leaves almost nothing of itself there.
+    A plain mean would smear an object in one band over all rows.  What a vignette or a flickering lamp leaves is a
+    level per row: in the same way, the median over five parts of the row.  Differences of rows hold none of it.
 
     Parameters
     ----------
@@ -174,6 +175,25 @@ def remove_level(rows: Plane, smooth: Index, means: Plane) -> None:
     for s in range(strips):
         for r in range(smooth[s, 0], smooth[s, 1]):
             _subtract(means[0], rows[r])
+    for s in range(strips):
+        for r in range(smooth[s, 0], smooth[s, 1]):
+            _subtract_level(rows[r], means[:, :1])
+
+
+@kernel
+def _subtract_level(line: Plane, means: Plane) -> None:
+    """Subtract the median over five parts of ``line`` (w,) of their means; ``means`` (5, 1) is scratch."""
+    width = line.shape[0]
+    for part in range(BANDS):
+        first, end = part * width // BANDS, (part + 1) * width // BANDS
+        total = np.float32(0.0)
+        for c in range(first, end):
+            total += line[c]
+        means[part, 0] = total / np.float32(max(end - first, 1))
+    _median(means[0], means[1], means[2], means[3], means[4])
+    level = means[0, 0]
+    for c in range(width):
+        line[c] -= level
 
 
 @kernel

@@ -125,7 +125,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     reach = found.reach if abs(start_px) > SURELY_MOVING_PX else LAST_FREQUENCY
     drift, products = follow(window, start_px, strips, options.exposure_ratio, reach)
     fit, lost = fit_strips(products, start_px, options.exposure_ratio, options.consensus)
-    if lost + int(np.sum(~strips)) > MAX_LOST_STRIPS:
+    if lost + STRIPS - len(products.rows) > MAX_LOST_STRIPS:
         return refused(MotionReason.BANDS, signed=True, window_s=span_s, method="joint", bands=votes)
     left = residual(fit) if fit is not None else None
     reason = doubt_fit(fit, left, products, options)

@@ -3,6 +3,11 @@
 In every cell (a strip of rows by a few columns) the frames are summed twice: as they are, and shifted so that the wall
 stands still.  The wall is strong in the second sum, an object in the first.  What is hidden in any frame is left out of
 the windows of all frames, so that they still show one and the same piece of wall.
+
+An object does not end where its edge runs along the motion, or where one cell more falls short of the limit: both sums
+are alike there, and what is left of it would hold the displacement back.  So cells that may belong to it are hidden,
+too, if they hang together with one that surely does (hysteresis as in Canny, IEEE Trans. Pattern Anal. Mach. Intell.
+8(6), 1986).
 """
 
 from __future__ import annotations
@@ -19,7 +24,9 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 CELL_PX = 16
 FLANK_PX = 12
-SURE = 5.0
+SURE, PERHAPS = 5.0, 2.0
+OUTSTANDING = 3.0  # times the power of the usual cell: more than walls are uneven
+STILL_SHARE = 0.6  # of the power of the shifted sum; a wall that moves keeps less when it is not shifted
 LEAST_TRAVEL_PX = 1
 LEAST_SHARE = 0.3
 
@@ -28,9 +35,9 @@ LEAST_SHARE = 0.3
 def _cell_powers(
     planes: Plane, order: Index, shift: Index, spans: Index, wanted: Mask, sums: Plane, out: Array
 ) -> None:
-    """Power in every cell (s, b) of the sum of the shifted frames over the root of their number.
+    """Power in every cell (s, b) of the sum of the shifted frames over the root of their number: all of it, and detail.
 
-    Noise keeps its power in it.
+    Noise keeps its power in it.  Detail is what is left beside the mean of every row in the cell.
 
     Parameters
     ----------
@@ -45,12 +52,12 @@ def _cell_powers(
     wanted
         Strips to look at, shape (s,).
     sums
-        Scratch, shape (3, w).
+        Scratch, shape (4, w).
     out
-        Result, shape (s, b).
+        Result, shape (2, s, b).
     """
     width = planes.shape[2]
-    total, column, seen = sums[0], sums[1], sums[2]
+    total, column, seen, level = sums[0], sums[1], sums[2], sums[3, : out.shape[2]]
     seen[:] = np.float32(0.0)
     for k in range(order.shape[0]):
         seen[max(0, -shift[k]) : min(width, width - shift[k])] += np.float32(1.0)
@@ -60,6 +67,7 @@ def _cell_powers(
         if not wanted[s]:
             continue
         column[:] = np.float32(0.0)
+        level[:] = np.float32(0.0)
         for r in range(spans[s, 0], spans[s, 1]):
             total[:] = np.float32(0.0)
             k = 0
@@ -73,12 +81,15 @@ def _cell_powers(
                     _add(line, total[low:high])
                 k += 1
             _add_square(total, column)
+            _add_level(total, level)
         _multiply(seen, column)
-        for b in range(out.shape[1]):
-            power = np.float32(0.0)
+        for b in range(out.shape[2]):
+            power, looks = np.float32(0.0), np.float32(0.0)
             for c in range(b * CELL_PX, (b + 1) * CELL_PX):
                 power += column[c]
-            out[s, b] = power
+                looks += np.float32(1.0) / seen[c]
+            out[0, s, b] = power
+            out[1, s, b] = power - level[b] / looks
 
 
 @kernel
@@ -105,6 +116,16 @@ def _add_square(line: Plane, total: Plane) -> None:
         total[c] += line[c] * line[c]
 
 
+@kernel
+def _add_level(line: Plane, level: Plane) -> None:
+    """Add the square of the sum over every 16 columns of ``line`` (w,) to ``level`` (w // 16,)."""
+    for b in range(level.shape[0]):
+        t = line[b * CELL_PX : (b + 1) * CELL_PX]
+        left = (t[0] + t[1]) + (t[2] + t[3]) + ((t[4] + t[5]) + (t[6] + t[7]))
+        right = (t[8] + t[9]) + (t[10] + t[11]) + ((t[12] + t[13]) + (t[14] + t[15]))
+        level[b] += (left + right) * (left + right)
+
+
 class OccluderFinder:
     """Buffers for binned frames of one size.
 
@@ -118,8 +139,8 @@ class OccluderFinder:
 
     def __init__(self, width: int, spans: Index) -> None:
         self._spans, self._all = spans, np.ones(len(spans), dtype=np.bool_)
-        self._sums = np.zeros((3, width), dtype=np.float32)
-        self._cells = np.zeros((3, len(spans), width // CELL_PX))
+        self._sums = np.zeros((4, width), dtype=np.float32)
+        self._cells = np.zeros((3, 2, len(spans), width // CELL_PX))
         self._samples = np.diff(spans, axis=1) * float(CELL_PX)
 
     def hidden(self, planes: Plane, order: Index, offset: Index) -> Mask:
@@ -129,19 +150,36 @@ class OccluderFinder:
         """
         one, still, moving = self._cells
         if int(offset.max() - offset.min()) < LEAST_TRAVEL_PX:
-            return np.zeros(still.shape, dtype=np.bool_)
-        _cell_powers(planes, order[:1], 0 * order[:1], self._spans, self._all, self._sums, one)
-        _cell_powers(planes, order, 0 * order, self._spans, self._all, self._sums, still)
-        usual = float(np.median(one / self._samples)) * self._samples
-        sure = SURE * usual * np.sqrt(2.0 / self._samples)
-        repeats: Mask = np.asarray(still - usual > sure)
+            return np.zeros(still.shape[1:], dtype=np.bool_)
+        self._powers(planes, order[:1], 0 * order[:1], self._all, one)
+        self._powers(planes, order, 0 * order, self._all, still)
+        usual = float(np.median(one[1] / self._samples)) * self._samples
+        noise = usual * np.sqrt(2.0 / self._samples)
+        repeats: Mask = np.asarray(still[1] - usual > SURE * noise)
         doubtful: Mask = np.any(repeats, axis=1)
         if not doubtful.any():
             return repeats
         shift = offset - (offset.min() + offset.max()) // 2
         moving[:] = 0.0
-        _cell_powers(planes, order, shift, self._spans, doubtful, self._sums, moving)
-        return np.asarray(repeats & (still - moving > sure))
+        self._powers(planes, order, shift, doubtful, moving)
+        surely: Mask = np.asarray(repeats & (still[1] - moving[1] > SURE * noise))
+        if not surely.any():
+            return surely
+        self._powers(planes, order, shift, ~doubtful, moving)
+        perhaps = (still[1] - moving[1] > PERHAPS * noise) & (still[1] - usual > PERHAPS * noise)
+        strong = (np.minimum(one[0], still[0]) > OUTSTANDING * usual) & (still[0] > STILL_SHARE * moving[0])
+        return connected(surely | perhaps | strong, surely)
+
+    def _powers(self, planes: Plane, order: Index, shift: Index, wanted: Mask, out: Array) -> None:
+        _cell_powers(planes, order, shift, self._spans, wanted, self._sums, out)
+
+
+def connected(cells: Mask, seeds: Mask) -> Mask:
+    """Those of the cells (s, b) that hang together with one of the seeds, over edges or corners; seeds are cells."""
+    many, label = cv2.connectedComponents(cells.astype(np.uint8), connectivity=8)
+    kept = np.zeros(many, dtype=np.bool_)
+    kept[label[seeds]] = True
+    return np.asarray(kept[label])
 
 
 def wall_window(hidden: Mask, starts: Index, window: Plane) -> tuple[Plane, Array]:

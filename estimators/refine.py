@@ -34,14 +34,16 @@ def follow(
     """Products of some strips from windows that follow the wall, and the drift they follow across the rows.
 
     A drift with which the strips agree less is that of something else (a slanting cable, say) and is not followed.
-    ``reach`` is the highest frequency that tells of the motion [cycles/px].
+    ``reach`` is the highest frequency that tells of the motion [cycles/px].  Strips that follow something else take
+    part as well where an object was found and cut out: what is left in them is asked once more.
 
     Strips are asked when a drift begins, when it jumps, and now and then; in between the window remembers the answer.
     """
 
     def cut(drift_px: float) -> Products:
         """Products of windows that follow a drift [px per frame]."""
-        return window.following(start_px, drift_px, reach).selected(strips)
+        products = window.following(start_px, drift_px, reach)
+        return products.selected(strips | window.cleared)
 
     harmless_px = DRIFT_SHARE * window.bin_height / (len(window.order) - 1)
     drift = UNMOVED

@@ -100,6 +100,12 @@ class FrameWindow:
         self._cut = _Cut(planes, order, offset, hidden)
         return self._buffers.products(self._cut, reach)
 
+    @property
+    def cleared(self) -> NDArray[np.bool_]:
+        """Strips (s,) whose windows, as they were cut last, leave an object out."""
+        assert self._cut is not None
+        return np.asarray(self._cut.hidden.any(axis=1))
+
     def halves(self, band: Band) -> tuple[Plane, Plane, Index]:
         """Pair products of both halves (2, 1, p, f) of the windows cut last, and where these start [px].
 

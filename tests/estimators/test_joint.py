@@ -134,6 +134,28 @@ def test_row_bands_see_past_what_is_fixed_to_the_airframe(name: str) -> None:
     assert measured(picture).displacement_px == pytest.approx(20.0, abs=0.15)
 
 
+@pytest.mark.parametrize("d", [-28.0, 26.0, 30.0])
+def test_a_vignette_is_no_object_in_front_of_a_fast_wall(d: float) -> None:
+    estimate = measured(rendered(d, 0, camera={"vignette": 0.4}))
+    assert estimate.accepted, estimate.reason
+    assert estimate.displacement_px == pytest.approx(d, abs=5.0 * estimate.sigma_px)
+
+
+def test_a_cable_does_not_hold_the_wall_back() -> None:
+    """A slow wall behind a cable, most of which runs along the motion: what is left of it would pull towards zero."""
+    seen = [measured(rendered(1.1, seed, occluders=("cable",))) for seed in range(8)]
+    errors = np.array([estimate.displacement_px - 1.1 for estimate in seen])
+    assert abs(errors.mean()) < 0.004
+    assert np.sqrt(np.mean((errors / [estimate.sigma_px for estimate in seen]) ** 2)) < 1.4
+
+
+def test_bands_that_only_saw_a_cable_take_part_once_it_is_cut_out() -> None:
+    """The cable wins the vote of two bands; four strips of ten would cost a third of the accuracy."""
+    sigmas = np.array([[measured(rendered(20.0, s, occluders=o)).sigma_px for o in ((), ("cable",))] for s in range(6)])
+    plain, behind = np.median(sigmas, axis=0)
+    assert behind < 1.2 * plain
+
+
 def test_without_the_vote_a_landing_gear_is_taken_for_a_wall_at_rest() -> None:
     picture = rendered(20.0, 10, contrast=0.02, occluders=("gear",))
     assert measured(picture, consensus=False).displacement_px == pytest.approx(0.0, abs=0.5)

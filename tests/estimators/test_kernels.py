@@ -53,13 +53,15 @@ def test_coefficients_are_haars_of_row_sums(dtype: type) -> None:
     np.testing.assert_allclose(_coefficients(frame, layout, 3)[layout.place], expected, rtol=1e-5, atol=1e-2)
 
 
-def test_the_level_of_a_column_is_the_median_of_five_bands() -> None:
+def test_levels_of_columns_and_then_of_rows_are_medians_of_five_means() -> None:
     layout = RowLayout(60)
     rows = np.random.default_rng(1).normal(size=(layout.used, 40)).astype(np.float32)
     smooth = [np.arange(first, end) for first, end in layout.smooth]
     bands = [rows[np.concatenate(smooth[k : k + 2])].mean(axis=0) for k in range(0, STRIPS, STRIPS // BANDS)]
     expected = rows.copy()
     expected[np.concatenate(smooth)] -= np.median(bands, axis=0)
+    parts = expected[np.concatenate(smooth)].reshape(-1, 5, 8).mean(axis=2)
+    expected[np.concatenate(smooth)] -= np.median(parts, axis=1)[:, None]
     remove_level(rows, layout.smooth, np.empty((BANDS, 40), dtype=np.float32))
     np.testing.assert_allclose(rows, expected, atol=1e-5)
 
@@ -332,3 +334,14 @@ def test_an_object_that_stands_still_is_found_where_it_is() -> None:
     hidden = finder.hidden(planes.astype(np.float32), np.arange(4), -3 * np.arange(4))
     assert np.argwhere(hidden).tolist() == [[2, 4], [2, 5]]
     assert not finder.hidden(planes.astype(np.float32), np.arange(4), np.zeros(4, dtype=np.int64)).any()
+
+
+def test_an_object_goes_on_where_its_edge_runs_along_the_motion() -> None:
+    """GIVEN a smooth stick along the rows WHEN cells are looked at THEN it is hidden between its ends, too."""
+    rng = np.random.default_rng(13)
+    wall = rng.normal(size=(40, 300)).astype(np.float32)
+    planes = np.stack([wall[:, 3 * k : 3 * k + 256] for k in range(4)]) + rng.normal(size=(4, 40, 256))
+    planes[:, 9, 56:168] = 9.0 + 0.1 * rng.normal(size=(4, 112))
+    finder = OccluderFinder(256, np.stack([np.arange(0, 40, 4), np.arange(4, 41, 4)], axis=1))
+    hidden = finder.hidden(planes.astype(np.float32), np.arange(4), -3 * np.arange(4))
+    assert np.argwhere(hidden).tolist() == [[2, b] for b in range(3, 11)]
