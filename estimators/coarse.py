@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from axialnav.estimators.layout import BANDS, RowLayout
 from axialnav.estimators.rows import apply_window, fast_length, hann
-from axialnav.estimators.search import LagTransform, Profiles, informative, search_spectra, unrelated_spread
+from axialnav.estimators.search import LagTransform, Profiles, search_weights
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
-from axialnav.estimators.texture import matched_weight
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
@@ -40,7 +39,7 @@ class CoarseSearch:
         self._re, self._im = np.zeros((2, frames, rows, count), dtype=np.float32)
         self._power = np.zeros((frames, groups, count), dtype=np.float32)
         self._pair_re, self._pair_im = np.zeros((2, frames, frames, groups, count), dtype=np.float32)
-        self._lags = LagTransform(BANDS, frames, self.band)
+        self._lags = LagTransform(BANDS, self.band)
 
     def push(self, rows: Plane, slot: int, older: list[int]) -> None:
         """Put a frame's coefficients (r, w) into a slot, beside those in the slots ``older``."""
@@ -57,13 +56,7 @@ class CoarseSearch:
 
     def profiles(self, order: list[int], grid_px: Array) -> Profiles:
         """Likelihood of every displacement [px] for the frames in the slots ``order``, oldest first."""
-        frames, rows = len(order), self._layout.coarse_count
-        power = self._power[order].sum(axis=0).reshape(*rows.shape, -1)
-        many = rows.sum(axis=0)
-        mean_power = power.sum(axis=0, dtype=np.float64) / (frames * many[:, None])
-        texture, noise = search_spectra(mean_power, many * frames, self.band)
-        weight = matched_weight(texture, noise, frames)
-        spread = unrelated_spread(power, weight, frames, rows)
         slots = np.array(order, dtype=np.int64)
+        weight, spread, reach = search_weights(self._power, slots, len(order), self._layout.coarse_count, self.band)
         found = self._lags.profiles(self._pair_re, self._pair_im, slots, weight, grid_px, spread)
-        return replace(found, reach=informative(texture, weight, many, self.band))
+        return replace(found, reach=reach)

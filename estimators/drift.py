@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from axialnav.estimators.frames import Image
 from axialnav.estimators.positions import centred_times
 from axialnav.estimators.rows import SUMMED_COLUMNS, apply_window, bin_columns, fast_length, hann
-from axialnav.estimators.search import STEP_PX, LagTransform, search_spectra, unrelated_spread
+from axialnav.estimators.search import STEP_PX, LagTransform, search_weights
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
-from axialnav.estimators.texture import matched_weight
 
 Plane = NDArray[np.float32]
 COLUMNS = 32
@@ -83,7 +82,7 @@ class DriftMeter:
         self._spectra = np.zeros((2, frames, self._count, count), dtype=np.float32)
         self._pairs = np.zeros((2, frames, frames, 1, count), dtype=np.float32)
         self._edges = np.array([0, self._count], dtype=np.int64)
-        self._lags = LagTransform(1, frames, self.band)
+        self._lags = LagTransform(1, self.band)
         reach = round(REACH_PX / STEP_PX)
         self._grid = np.asarray(STEP_PX * np.arange(-reach, reach + 1), dtype=np.float64)
 
@@ -119,11 +118,8 @@ class DriftMeter:
         return self._solve(squares, len(images))
 
     def _solve(self, squares: Plane, frames: int) -> Drift:
-        mean_power, looks = squares.astype(np.float64) / (frames * self._count), np.array([float(self._count * frames)])
-        texture, noise = search_spectra(mean_power, looks, self.band)
-        weight = matched_weight(texture, noise, frames)
-        spread = unrelated_spread(squares[None], weight, frames, looks[None] / frames)
-        order = np.arange(frames)
+        order, rows = np.arange(frames), np.array([[float(self._count)]])
+        weight, spread, _ = search_weights(squares[None], order[:1], frames, rows, self.band)
         found = self._lags.profiles(self._pairs[0], self._pairs[1], order, weight, self._grid, spread)
         everyone, best = np.ones(1, dtype=np.bool_), int(np.argmax(found.gain[0]))
         if best in (0, len(self._grid) - 1) or found.significance(best, everyone) < MIN_SIGNIFICANCE:

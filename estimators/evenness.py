@@ -110,15 +110,19 @@ def stranger(fit: Fit, rows: Array, omega: Array) -> bool:
     if frames < 3:
         return False
     pairs = pair_frames(frames)
-    i, j = pairs[pairs[:, 1] - pairs[:, 0] == 1].T
+    near = pairs[:, 1] - pairs[:, 0] == 1
+    i, j = pairs[near].T
+    shared = fit.coherence.sum(axis=0)[near], -0.5 * fit.information.sum(axis=0)[i, j]
+    missing = [_missing(part) for part in shared]
+    if not any(missing):
+        return False
     total = fit.texture + fit.noise
-    variance = 0.5 * WINDOW_VARIANCE * (rows @ (fit.weight**2 * (total**2 + fit.texture**2)))
-    coarse = fit.coherence.sum(axis=0)[pairs[:, 1] - pairs[:, 0] == 1]
-    fine = -0.5 * fit.information[:, i, j].sum(axis=0)
-    return _alone(coarse, float(variance.sum())) or _alone(fine, float(omega**4 @ variance))
+    variance = 0.5 * WINDOW_VARIANCE * (rows @ ((fit.weight * total) ** 2 + (fit.weight * fit.texture) ** 2))
+    sigma = np.sqrt(variance.sum()), np.sqrt(omega**4 @ variance)
+    return any(lack > SURE_PAIR * float(own) for lack, own in zip(missing, sigma, strict=True))
 
 
-def _alone(shared: Array, variance: float) -> bool:
-    """Whether the least of what neighbouring frames share (n - 1,) is far below the usual, beyond noise."""
+def _missing(shared: Array) -> float:
+    """How much less than usual the least is of what neighbouring frames share (n - 1,); 0 unless far less."""
     usual, least = middle(shared), float(shared.min())
-    return least < MIN_PAIR_SHARE * usual and usual - least > SURE_PAIR * float(np.sqrt(variance))
+    return usual - least if least < MIN_PAIR_SHARE * usual else 0.0

@@ -55,14 +55,13 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
     wins, then the most likely one.
     """
     gain = profiles.gain
-    bands = gain.shape[0]
+    bands, likeliest = gain.shape[0], int(np.argmax(profiles.everyone))
     if not every_band:
         everyone = np.ones(bands, dtype=np.bool_)
-        return Choice(int(np.argmax(gain.sum(axis=0))), everyone, ~everyone)
+        return Choice(likeliest, everyone, ~everyone)
     peaks = gain.argmax(axis=1)
     best = gain[np.arange(bands), peaks]
     sure = best > SURE * profiles.spread
-    likeliest = int(np.argmax(gain.sum(axis=0)))
     choices = []
     for candidate in (likeliest, *sorted(set(peaks[sure].tolist()) - {likeliest})):
         near = profiles.near(candidate, REACH_PX)
@@ -105,29 +104,30 @@ def disturbed(fit: Fit, products: Products) -> Mask:
     Something fixed to the camera leaves the windows that follow the wall, and is noise to them; in a strip of its own
     it costs less left out than carried along.
     """
-    frames = products.frames
-    whole = products.power.reshape(len(products.power), -1) @ fit.weight.ravel().astype(np.float32)
-    moving = whole + 2.0 * fit.coherence.sum(axis=1)
-    rows = products.rows.sum(axis=1)
-    alien = (whole - moving / frames) / (frames - 1) / rows
-    texture = (moving - whole) / (frames * (frames - 1)) / rows
-    order = np.argsort(alien)
-    usual = middle(alien[order[: (len(alien) + 1) // 2 + 1]])
-    bad = (alien > MAX_ALIEN * usual) & (alien - usual > MAX_ALIEN_SHARE * texture)
-    bad[order[: len(alien) - MAX_LOST_STRIPS]] = False
-    return np.asarray(bad)
+    strips, frames = len(products.power), products.frames
+    whole = products.power.reshape(strips, -1) @ fit.weight.ravel()
+    shared = 2.0 * fit.coherence.sum(axis=1)
+    unit = (frames - 1) * products.rows.sum(axis=1)
+    alien = (whole - (whole + shared) / frames) / unit
+    usual = middle(np.sort(alien)[: (strips + 1) // 2 + 1])
+    bad = np.asarray(alien > MAX_ALIEN * usual)
+    if bad.any():
+        bad &= alien - usual > MAX_ALIEN_SHARE * shared / (frames * unit)
+        bad[np.argsort(alien)[: strips - MAX_LOST_STRIPS]] = False
+    return bad
 
 
-def whiteness(fit: Fit, rows: Array) -> float:
-    """Fine over middle part of the repeating power [-]: about 1 for a pixel pattern, near 0 behind any lens.
+def white(fit: Fit, rows: Array) -> bool:
+    """Whether what repeats is as strong in its fine part as a pixel pattern is, and nothing behind a lens can be.
 
-    0 where the fine part does not stand out from its own noise.  ``rows`` (c,) are the rows behind the spectra.
+    No where the fine part does not stand out from its own noise.  ``rows`` (c,) are the rows behind the spectra.
     """
     power, count = fit.coherent.sum(axis=0), fit.coherent.shape[1]
     first = int(FINE_FROM * count)
     fine, middle = power[first:], power[int(MIDDLE[0] * count) : int(MIDDLE[1] * count)]
+    level = float(fine.mean())
+    if level <= MAX_WHITENESS * max(float(middle.mean()), TINY):
+        return False
     frames = fit.score.shape[1]
     spread = np.sqrt(np.sum(np.mean(fit.noise[:, first:], axis=1) ** 2 / rows) / len(fine)) / frames
-    if float(fine.mean()) < FAR * float(spread):
-        return 0.0
-    return float(fine.mean() / max(float(middle.mean()), TINY))
+    return level >= FAR * float(spread)

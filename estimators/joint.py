@@ -27,8 +27,11 @@ from axialnav.estimators.positions import (
 from axialnav.estimators.products import Products
 from axialnav.estimators.spectrum import pair_count
 from axialnav.estimators.texture import blur_power, matched_weight, sharp_family, smooth_spectra
+from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
+Index = NDArray[np.int64]
 LIMITS = np.array([0.3, 1e-4, 4.0])  # longest Newton step and the one that ends the climb [px], number of steps
 MAX_PASSES, SAME_PX = 2, 0.15  # how often weights are computed, and how far no frame may move for them to stay good
 BENDS_PX = 0.125 * np.arange(-16, 17)
@@ -63,27 +66,52 @@ class Fit:
     coherence: Array
     texture: Array
     noise: Array
-    weight: Array
+    weight: Plane
     coherent: Array
 
 
-def spectra_at(products: Products, position_px: Array, blur_px: float) -> Array:
-    """Smooth texture, smooth noise and raw coherent power per row and frame at these positions, shape (3, c, f)."""
-    band, sums = products.band, products.total
-    shapes, family, starts = sharp_family(band.first, band.count, band.length)
-    pairs, out = np.empty(sums.power.shape, dtype=np.float32), np.empty((3, *sums.power.shape))
-    coherent_power(sums.re, sums.im, band.omega(), position_px, pairs)
-    blur = blur_power(blur_px, band.frequency())
-    smooth_spectra(sums.power, pairs, sums.rows, products.frames, shapes, family, starts, blur, out)
-    return out
+def spectra_at(products: Products, position_px: Array, blur_px: float) -> tuple[Array, Plane]:
+    """Smooth texture, smooth noise and raw coherent power per row and frame (3, c, f), and the weights (c, f)."""
+    sums, omega = products.total, products.band.omega()
+    family = sharp_family(products.band.first, products.band.count, products.band.length)
+    out, weight = np.empty((3, *sums.power.shape)), np.empty_like(sums.power)
+    _spectra(
+        sums.re, sums.im, sums.power, sums.rows, omega, position_px, blur_px, products.independent, *family, out, weight
+    )
+    return out, weight
 
 
-def evaluate(products: Products, weight: Array, position_px: Array) -> tuple[Array, Array, Array]:
+@kernel
+def _spectra(
+    re: Plane,
+    im: Plane,
+    power: Plane,
+    rows: Array,
+    omega: Array,
+    position: Array,
+    blur_px: float,
+    independent: float,
+    shapes: Array,
+    family: Array,
+    starts: Index,
+    out: Array,
+    weight: Plane,
+) -> None:
+    """See :func:`spectra_at`."""
+    pairs, blur = np.empty(power.shape, dtype=np.float32), np.empty(omega.shape[0])
+    coherent_power(re, im, omega, position, pairs)
+    blur_power(blur_px, omega, blur)
+    smooth_spectra(power, pairs, rows, position.shape[0], shapes, family, starts, blur, out)
+    for c in range(weight.shape[0]):
+        matched_weight(out[0, c], out[1, c], position.shape[0], independent, weight[c])
+
+
+def evaluate(products: Products, weight: Plane, position_px: Array) -> tuple[Array, Array, Array]:
     """Score (s, n), information (s, n, n) and coherence (s, p) of every strip with weights (c, f)."""
     strips, frames = len(products.rows), products.frames
     score, information = np.empty((strips, frames)), np.empty((strips, frames, frames))
-    coherence, factor = np.empty((strips, pair_count(frames))), weight.astype(np.float32)
-    position_scores(products.re, products.im, factor, products.band.omega(), position_px, score, information, coherence)
+    coherence = np.empty((strips, pair_count(frames)))
+    position_scores(products.re, products.im, weight, products.band.omega(), position_px, score, information, coherence)
     return score, information, coherence
 
 
@@ -110,8 +138,7 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, thorough
     motion = np.array(start, dtype=np.float64)
     for _ in range(MAX_PASSES):
         at = basis @ motion
-        spectra = spectra_at(products, at - products.offset_px, exposure_ratio * abs(float(motion[0])))
-        weight = matched_weight(spectra[0], spectra[1], products.frames) * products.independent
+        spectra, weight = spectra_at(products, at - products.offset_px, exposure_ratio * abs(float(motion[0])))
         if not _climbed(products, weight, basis, motion):
             return None
         if not thorough and float(np.abs(basis @ motion - at).max()) < SAME_PX:
@@ -122,20 +149,20 @@ def fit_motion(products: Products, start: Array, exposure_ratio: float, thorough
 def refit_motion(weighted: Products, start: Array, known: Fit) -> Fit | None:
     """:func:`fit_motion` with the spectra and weights of a fit to nearly the same products, ``weighted`` by it."""
     basis, motion = motion_basis(weighted.frames, len(start) == 2), np.array(start, dtype=np.float64)
-    one = np.ones((1, weighted.band.count))
+    one = np.ones((1, weighted.band.count), dtype=np.float32)
     if not _climbed(weighted, one, basis, motion):
         return None
     return _fit_at(weighted, one, basis, motion, (known.texture, known.noise, known.weight, known.coherent))
 
 
-def _climbed(products: Products, weight: Array, basis: Array, motion: Array) -> bool:
+def _climbed(products: Products, weight: Plane, basis: Array, motion: Array) -> bool:
     """Newton steps on ``motion``, in place; whether the likelihood has a maximum there."""
-    sums, narrow = products.total, weight.astype(np.float32)
-    return climb(sums.re, sums.im, narrow, products.band.omega(), basis, products.offset_px, motion, LIMITS)
+    sums = products.total
+    return climb(sums.re, sums.im, weight, products.band.omega(), basis, products.offset_px, motion, LIMITS)
 
 
 def _fit_at(
-    products: Products, weight: Array, basis: Array, motion: Array, spectra: tuple[Array, Array, Array, Array]
+    products: Products, weight: Plane, basis: Array, motion: Array, spectra: tuple[Array, Array, Plane, Array]
 ) -> Fit | None:
     score, information, coherence = evaluate(products, weight, basis @ motion - products.offset_px)
     covariance = np.empty((len(motion), len(motion)))
@@ -146,9 +173,10 @@ def _fit_at(
 
 def best_bend(products: Products, fit: Fit) -> float:
     """Change of the displacement per frame [px] from a coarse look around a fit without one."""
-    weight = fit.weight if len(fit.weight) == products.re.shape[1] else np.ones((1, products.band.count))
+    known = len(fit.weight) == products.re.shape[1]
+    weight = fit.weight if known else np.ones((1, products.band.count), dtype=np.float32)
     basis, sums = motion_basis(products.frames, True), products.total
     position = basis[:, 0] * fit.motion[0] + BENDS_PX[:, None] * basis[:, 1] - products.offset_px
     gain = np.empty(len(BENDS_PX))
-    position_gains(sums.re, sums.im, weight.astype(np.float32), products.band.omega(), position, gain)
+    position_gains(sums.re, sums.im, weight, products.band.omega(), position, gain)
     return float(BENDS_PX[int(np.argmax(gain))])

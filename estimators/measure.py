@@ -20,11 +20,10 @@ from axialnav.estimators.evenness import (
 )
 from axialnav.estimators.integrity import (
     MAX_LOST_STRIPS,
-    MAX_WHITENESS,
     STATIC_PX,
     Choice,
     choose,
-    whiteness,
+    white,
 )
 from axialnav.estimators.joint import Fit
 from axialnav.estimators.kappa import UNKNOWN, blur_ratio
@@ -32,7 +31,7 @@ from axialnav.estimators.layout import BANDS, STRIPS
 from axialnav.estimators.products import Products
 from axialnav.estimators.refine import fit_strips, follow
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
-from axialnav.estimators.search import STEP_PX, Profiles
+from axialnav.estimators.search import Profiles, search_step
 from axialnav.estimators.spectrum import LAST_FREQUENCY
 from axialnav.estimators.stretch import stretch_variance
 from axialnav.estimators.window import FrameWindow
@@ -90,13 +89,14 @@ def search_grid(width: int, frames: int, prior_px: tuple[float, float] | None) -
     if prior_px is not None:
         margin = PRIOR_SIGMAS * prior_px[1] + PRIOR_MARGIN_PX
         low, high = max(low, prior_px[0] - margin), min(high, prior_px[0] + margin)
-    return _steps(math.floor(low / STEP_PX), math.ceil(high / STEP_PX))
+    step = search_step(frames)
+    return _steps(math.floor(low / step), math.ceil(high / step), step)
 
 
 @lru_cache(maxsize=8)
-def _steps(first: int, last: int) -> Array:
+def _steps(first: int, last: int, step: float) -> Array:
     """Grid of displacements [px], shared: not to be written to."""
-    return np.asarray(np.arange(first, last + 1) * STEP_PX, dtype=np.float64)
+    return np.asarray(np.arange(first, last + 1) * step, dtype=np.float64)
 
 
 def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
@@ -165,7 +165,7 @@ def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, option
         return MotionReason.PAIR
     if options.evenness and uneven(fit, left):
         return MotionReason.UNEVEN
-    if abs(float(fit.motion[0])) < STATIC_PX and whiteness(fit, products.rows.sum(axis=0)) > MAX_WHITENESS:
+    if abs(float(fit.motion[0])) < STATIC_PX and white(fit, products.rows.sum(axis=0)):
         return MotionReason.STATIC
     if not math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, products.frames)) <= MAX_SIGMA_PX:
         return MotionReason.SIGMA

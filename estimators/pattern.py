@@ -8,6 +8,7 @@ every displacement towards zero.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 from axialnav.estimators.joint import Fit
 from axialnav.estimators.positions import coherent_power, motion_basis, relative_turn, turns
 from axialnav.estimators.products import Products
-from axialnav.estimators.spectrum import pair_count
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
@@ -36,21 +36,52 @@ def pattern_power(products: Products, fit: Fit) -> tuple[float, float]:
     fit
         Their fit.
     """
-    frames, sums, omega = products.frames, products.total, products.band.omega()
-    wall = motion_basis(frames, len(fit.motion) == 2) @ fit.motion
-    many = pair_count(frames)
-    at_camera, at_wall = np.empty((2, *sums.power.shape), dtype=np.float32)
-    coherent_power(sums.re, sums.im, omega, -products.offset_px, at_camera)
-    coherent_power(sums.re, sums.im, omega, wall - products.offset_px, at_wall)
-    cosine, sine = np.empty((2, frames, len(omega)), dtype=np.float32)
+    sums, omega = products.total, products.band.omega()
+    wall = motion_basis(products.frames, len(fit.motion) == 2) @ fit.motion
+    first = int(np.searchsorted(omega, 2.0 * np.pi * LOWEST_FREQUENCY, side="right"))
+    match, total = _repeated(
+        sums.re, sums.im, sums.rows, omega, wall, products.offset_px, fit.texture, fit.noise, first
+    )
+    return match / total, math.sqrt(WINDOW_VARIANCE / (2.0 * total))
+
+
+@kernel
+def _repeated(
+    re: Plane,
+    im: Plane,
+    rows: Array,
+    omega: Array,
+    wall: Array,
+    offset: Array,
+    texture: Array,
+    noise: Array,
+    first: int,
+) -> tuple[float, float]:
+    """What repeats at the camera's position beyond the wall's part in it, weighted, and the sum of the weights.
+
+    Products (c, p, f) of ``rows`` (c,) rows, positions of the wall and of the windows (n,) [px], power (c, f) of
+    texture and noise; the frequencies from number ``first`` on count.
+    """
+    classes, many, count = re.shape
+    frames = wall.shape[0]
+    at_camera, at_wall = np.empty((classes, count), dtype=np.float32), np.empty((classes, count), dtype=np.float32)
+    coherent_power(re, im, omega, -offset, at_camera)
+    coherent_power(re, im, omega, wall - offset, at_wall)
+    cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
     turns(omega, wall, cosine, sine)
-    alike = 0.5 * (cosine.sum(axis=0) ** 2 + sine.sum(axis=0) ** 2 - frames)
-    apart = np.maximum(many - alike**2 / many, 1e-6)
-    high = omega > 2.0 * np.pi * LOWEST_FREQUENCY
-    weight = (high * apart) / (fit.texture + fit.noise) ** 2
-    total = float(sums.rows @ weight.sum(axis=1))
-    match = float(np.sum(weight / apart * (at_camera - at_wall * (alike / many))))
-    return match / total, float(np.sqrt(WINDOW_VARIANCE / (2.0 * total)))
+    match, total = 0.0, 0.0
+    for f in range(first, count):
+        x, y = 0.0, 0.0
+        for k in range(frames):
+            x += cosine[k, f]
+            y += sine[k, f]
+        alike = 0.5 * (x * x + y * y - frames)
+        apart = max(many - alike * alike / many, 1e-6)
+        for c in range(classes):
+            power = texture[c, f] + noise[c, f]
+            match += (at_camera[c, f] - at_wall[c, f] * (alike / many)) / (power * power)
+            total += rows[c] * apart / (power * power)
+    return match, total
 
 
 def without_pattern(products: Products, power: float) -> Products:

@@ -25,16 +25,28 @@ Plane = NDArray[np.float32]
 
 @kernel
 def turns(omega: Array, position: Array, cosine: Plane, sine: Plane) -> None:
-    """``exp(i w x_k)`` of all frames, shapes (n, f), by repeated turns: ``omega`` (f,) is evenly spaced."""
-    count = omega.shape[0]
-    step = omega[1] - omega[0]
+    """``exp(i w x_k)`` of all frames, shapes (n, f): ``omega`` (f,) is evenly spaced.
+
+    What is known of the first frequencies, turned on, is what the next ones need: twice as many with every step.
+    """
+    count, step = omega.shape[0], omega[1] - omega[0]
     for k in range(position.shape[0]):
-        c, s = np.cos(step * position[k]), np.sin(step * position[k])
-        x, y = np.cos(omega[0] * position[k]), np.sin(omega[0] * position[k])
-        for f in range(count):
-            cosine[k, f] = x
-            sine[k, f] = y
-            x, y = x * c - y * s, x * s + y * c
+        x, y = cosine[k], sine[k]
+        x[0], y[0] = np.cos(omega[0] * position[k]), np.sin(omega[0] * position[k])
+        known = 1
+        while known < count:
+            angle, many = known * step * position[k], min(known, count - known)
+            c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
+            _turn_on(x[:many], y[:many], c, s, x[known : known + many], y[known : known + many])
+            known += many
+
+
+@kernel
+def _turn_on(x: Plane, y: Plane, c: np.float32, s: np.float32, out_x: Plane, out_y: Plane) -> None:
+    """``(x + i y) (c + i s)`` for every frequency."""
+    for f in range(x.shape[0]):
+        out_x[f] = x[f] * c - y[f] * s
+        out_y[f] = x[f] * s + y[f] * c
 
 
 @kernel

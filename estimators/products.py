@@ -71,11 +71,11 @@ class Products:
             height=self.height[strips],
         )
 
-    def weighted(self, weight: Array) -> Products:
+    def weighted(self, weight: Plane) -> Products:
         """One class in place of all, their weighted sum; ``weight`` (c, f).  Its own memory, its power is zero."""
         strips, _, pairs, count = self.re.shape
         re, im = np.zeros((2, strips, 1, pairs, count), dtype=np.float32)
-        _weigh(self.re, self.im, weight.astype(np.float32), re, im)
+        _weigh(self.re, self.im, weight, re, im)
         power, rows = np.zeros((strips, 1, count), dtype=np.float32), self.rows.sum(axis=1, keepdims=True)
         return replace(self, re=re, im=im, power=power, rows=rows)
 

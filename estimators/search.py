@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.spectrum import LAST_FREQUENCY, Band
-from axialnav.estimators.texture import sharp_family, texture_power
+from axialnav.estimators.texture import matched_weight, sharp_family, texture_power
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
-STEP_PX, SAMPLES_PER_PX = 0.25, 2  # half a sample, which ``_gather`` relies on
+Index = NDArray[np.int64]
+STEP_PX = 0.25
 SOFTENING = 3.0  # windows and texture that is not Gaussian make the likelihood over-confident by about this factor
 NEAR_PX = 1.0
 RIVAL_PX = 8.0
@@ -23,6 +26,11 @@ NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold
 ENOUGH_INFORMATION, REACH_MARGIN, REACH_STEP = 0.98, 1.25, LAST_FREQUENCY / 12
 LEAST_REACH = 0.5 * LAST_FREQUENCY  # noise and patterns of the pixels are seen above the texture
 HANN_VARIANCE = 1.94  # of a sum over neighbouring bins, which a Hann window makes dependent
+
+
+def search_step(frames: int) -> float:
+    """Distance of the displacements to look at [px]: two frames tell them less sharply apart than more do."""
+    return STEP_PX if frames > 2 else 2.0 * STEP_PX
 
 
 @dataclass(frozen=True)
@@ -42,13 +50,18 @@ class Profiles:
     """
 
     grid_px: Array
-    gain: Array
+    gain: Plane
     spread: Array
     reach: float = LAST_FREQUENCY
 
-    def total(self, bands: NDArray[np.bool_]) -> Array:
+    @cached_property
+    def everyone(self) -> Plane:
+        """Sum over all bands, shape (d,)."""
+        return np.asarray(np.ones(len(self.gain), dtype=np.float32) @ self.gain)
+
+    def total(self, bands: NDArray[np.bool_]) -> Plane:
         """Sum over some bands, shape (d,)."""
-        return np.asarray(bands.astype(np.float64) @ self.gain)
+        return self.everyone if bands.all() else np.asarray(bands.astype(np.float32) @ self.gain)
 
     def near(self, index: int, reach_px: float) -> slice:
         """Grid points within ``reach_px`` of a grid point."""
@@ -62,7 +75,8 @@ class Profiles:
         left, middle, right = (float(gain) for gain in bands.astype(np.float64) @ self.gain[:, index - 1 : index + 2])
         bend = 2.0 * middle - left - right
         shift = 0.5 * (right - left) / bend if bend > 0.0 else 0.0
-        return float(self.grid_px[index]) + STEP_PX * max(-0.5, min(0.5, shift))
+        step = float(self.grid_px[1] - self.grid_px[0])
+        return float(self.grid_px[index]) + step * max(-0.5, min(0.5, shift))
 
     def significance(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Height of the total at a grid point in standard deviations of unrelated frames."""
@@ -75,7 +89,7 @@ class Profiles:
         away over the total there [-].
         """
         total = self.total(bands)
-        mass = np.exp(np.minimum((total - total[index]) / SOFTENING, 50.0))
+        mass = np.exp(np.minimum((total - total[index]) * np.float32(1.0 / SOFTENING), np.float32(50.0)))
         near, apart = self.near(index, NEAR_PX), self.near(index, RIVAL_PX)
         whole = float(mass.sum())
         far = [float(part.max()) for part in (total[: apart.start], total[apart.stop :]) if len(part)]
@@ -86,26 +100,22 @@ class Profiles:
 class LagTransform:
     """From pair products to the profiles of all bands; scratch of one size.
 
+    A product of frames m periods apart turns m times as fast with the displacement: its frequency f is put in the
+    place of m f, and one inverse transform of the sum over all lags gives the likelihood of all displacements.
+
     Parameters
     ----------
     bands
         Bands of the picture.
-    frames
-        Number of frames.
     band
         Frequencies in use.
     """
 
-    def __init__(self, bands: int, frames: int, band: Band) -> None:
+    def __init__(self, bands: int, band: Band) -> None:
         self.band, self.bands = band, bands
-        length = SAMPLES_PER_PX * band.length
-        self._sums = np.zeros((2, bands * (frames - 1), band.count), dtype=np.float32)
-        self._packed = np.zeros((bands * (frames - 1), length), dtype=np.float32)
-        self._correlation = np.zeros_like(self._packed)
+        self._spectrum, self._likelihood = np.zeros((2, bands * round(band.length / STEP_PX)), dtype=np.float32)
 
-    def profiles(
-        self, re: Plane, im: Plane, order: NDArray[np.int64], weight: Array, grid_px: Array, spread: Array
-    ) -> Profiles:
+    def profiles(self, re: Plane, im: Plane, order: Index, weight: Plane, grid_px: Array, spread: Array) -> Profiles:
         """Evaluate ``2 sum_m sum_f Re(C_m exp(-i w d m))`` on the grid of displacements.
 
         Parameters
@@ -118,33 +128,40 @@ class LagTransform:
         weight
             Matched weights, shape (c, f).
         grid_px
-            Displacements [px], neighbouring multiples of ``STEP_PX``, shape (d,).
+            Displacements [px], neighbouring multiples of ``STEP_PX`` or of a multiple of it, shape (d,).
         spread
             See :class:`Profiles`.
         """
-        lags = self.bands * (len(order) - 1)
-        sums, packed, correlation = self._sums[:, :lags], self._packed[:lags], self._correlation[:lags]
-        lag_sums(re, im, order, weight.astype(np.float32), sums)
-        _pack(sums, self.band.first, packed)
-        cv2.dft(packed, correlation, flags=cv2.DFT_ROWS | cv2.DFT_INVERSE | cv2.DFT_REAL_OUTPUT)
-        gain = np.zeros((self.bands, len(grid_px)))
-        _gather(correlation.reshape(self.bands, -1, packed.shape[1]), round(grid_px[0] / STEP_PX), gain)
+        step = float(grid_px[1] - grid_px[0])
+        length = round(self.band.length / step)
+        spectrum, likelihood = (
+            scratch[: self.bands * length].reshape(self.bands, length) for scratch in (self._spectrum, self._likelihood)
+        )
+        lag_spectrum(re, im, order, weight, self.band.first, spectrum)
+        cv2.dft(spectrum, likelihood, flags=cv2.DFT_ROWS | cv2.DFT_INVERSE | cv2.DFT_REAL_OUTPUT)
+        gain = np.empty((self.bands, len(grid_px)), dtype=np.float32)
+        _cut_out(likelihood, round(float(grid_px[0]) / step), gain)
         return Profiles(grid_px, gain, spread)
 
 
 @kernel
-def lag_sums(re: Plane, im: Plane, order: NDArray[np.int64], weight: Plane, sums: Plane) -> None:
-    """Weighted sums over all pairs of equal distance in time: (n, n, b * c, f) to (2, b * lags, f), lag 1 first."""
-    frames, classes = order.shape[0], weight.shape[0]
-    sums[:] = np.float32(0.0)
-    for i in range(frames):
-        for j in range(i + 1, frames):
-            for b in range(re.shape[2] // classes):
-                row = b * (frames - 1) + j - i - 1
+def lag_spectrum(re: Plane, im: Plane, order: Index, weight: Plane, first: int, spectrum: Plane) -> None:
+    """Spectrum over displacement of every band's likelihood, (b, l), in the form that the inverse transform takes.
+
+    Products (n, n, b * c, f) from bin ``first`` on, slots in use, weights (c, f).
+    """
+    frames, (classes, count) = order.shape[0], weight.shape
+    sum_re, sum_im = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
+    spectrum[:] = np.float32(0.0)
+    for b in range(spectrum.shape[0]):
+        for lag in range(1, frames):
+            sum_re[:] = np.float32(0.0)
+            sum_im[:] = np.float32(0.0)
+            for i in range(frames - lag):
                 for c in range(classes):
-                    group = b * classes + c
-                    _add_weighted(re[order[i], order[j], group], weight[c], sums[0, row])
-                    _add_weighted(im[order[i], order[j], group], weight[c], sums[1, row])
+                    _add_weighted(re[order[i], order[i + lag], b * classes + c], weight[c], sum_re)
+                    _add_weighted(im[order[i], order[i + lag], b * classes + c], weight[c], sum_im)
+            _put(sum_re, sum_im, first, lag, spectrum[b])
 
 
 @kernel
@@ -154,77 +171,128 @@ def _add_weighted(values: Plane, weight: Plane, total: Plane) -> None:
 
 
 @kernel
-def _pack(sums: Plane, first: int, packed: Plane) -> None:
-    """Conjugate spectra as rows of (Re_0, Re_1, Im_1, Re_2, ...), the form that the inverse transform takes."""
-    for r in range(packed.shape[0]):
-        re, im, line = sums[0, r], sums[1, r], packed[r, 2 * first - 1 :]
-        for f in range(re.shape[0]):
-            line[2 * f] = re[f]
-            line[2 * f + 1] = -im[f]
+def _put(re: Plane, im: Plane, first: int, lag: int, line: Plane) -> None:
+    """Add conjugate spectra at ``lag`` times their frequencies to (Re_0, Re_1, Im_1, Re_2, ...), round its end."""
+    length = line.shape[0]
+    place = lag * first % length
+    for f in range(re.shape[0]):
+        if 2 * place < length and place > 0:
+            line[2 * place - 1] += re[f]
+            line[2 * place] -= im[f]
+        elif 2 * place > length:
+            line[2 * (length - place) - 1] += re[f]
+            line[2 * (length - place)] += im[f]
+        else:  # the two numbers that have no imaginary part, and no mirror image
+            line[max(2 * place - 1, 0)] += np.float32(2.0) * re[f]
+        place += lag
+        if place >= length:
+            place -= length
 
 
 @kernel
-def _gather(correlation: Plane, first: int, gain: Array) -> None:
-    """Read lag m of the circular correlations (b, m, l) at m times every displacement.
-
-    Displacements are multiples of a quarter pixel from number ``first`` on, samples half a pixel apart: what is read
-    lies on a sample or in the middle between two.
-    """
-    bands, lags, length = correlation.shape
-    half = np.float32(0.5)
-    for b in range(bands):
-        for m in range(lags):
-            line = correlation[b, m]
-            for d in range(gain.shape[1]):
-                place = (first + d) * (m + 1)
-                left = place >> 1
-                if left < 0 or left >= length:
-                    left %= length
-                right = left + (place & 1)
-                gain[b, d] += (line[left] + line[right if right < length else 0]) * half
+def _cut_out(circle: Plane, first: int, out: Plane) -> None:
+    """Samples (b, d) of circular functions (b, l) from number ``first`` on, which may be negative."""
+    length = circle.shape[1]
+    for b in range(circle.shape[0]):
+        start, done = first % length, 0
+        while done < out.shape[1]:
+            many = min(length - start, out.shape[1] - done)
+            out[b, done : done + many] = circle[b, start : start + many]
+            start, done = 0, done + many
 
 
-def unrelated_spread(power: Plane, weight: Array, frames: int, rows: Array) -> Array:
-    """Standard deviation of the profile of frames that share nothing but their spectra, shape (b,).
+def search_weights(power: Plane, order: Index, frames: int, rows: Array, band: Band) -> tuple[Plane, Array, float]:
+    """How much every frequency counts in a search.
 
     Parameters
     ----------
     power
-        Power summed over the rows of a band and all frames, shape (b, c, f).
-    weight
-        Matched weights, shape (c, f).
+        Sums of ``|Y|^2`` over the rows, by slot, shape (n, b * c, f).
+    order
+        Slots in use.
     frames
-        Number of frames.
+        Number of frames in them.
     rows
         Rows of every band and class, shape (b, c).
+    band
+        Frequencies in use.
+
+    Returns
+    -------
+    weight
+        Matched weights of texture and white noise, the latter read off the finest class, shape (c, f).
+    spread
+        Standard deviation of the profile of frames that share nothing but their spectra, shape (b,).
+    reach
+        Frequency beyond which hardly anything tells of the motion, in steps of a twelfth of the band [cycles/px].  It
+        has a margin, for finer rows than those of the search hold finer detail.
     """
-    pairs = 0.5 * frames * (frames - 1)
-    of_one_frame = weight * power / frames
-    variance = np.sum(np.sum(of_one_frame**2, axis=-1) / rows, axis=-1)
-    return np.asarray(np.sqrt(2.0 * HANN_VARIANCE * pairs * variance))
+    weight, spread = np.empty((rows.shape[1], band.count), dtype=np.float32), np.zeros(len(rows))
+    family = sharp_family(band.first, band.count, band.length)
+    last = _weigh(power, order, frames, rows, band.omega(), *family, weight, spread) + band.first
+    steps = math.ceil(REACH_MARGIN * last / band.length / REACH_STEP)
+    return weight, spread, min(max(steps * REACH_STEP, LEAST_REACH), LAST_FREQUENCY)
 
 
-def search_spectra(power: Array, looks: Array, band: Band) -> tuple[Array, Array]:
-    """Texture (c, f) and noise (f,) from the mean power (c, f) of ``looks`` (c,) rows.
+@kernel
+def _weigh(
+    power: Plane,
+    order: Index,
+    frames: int,
+    rows: Array,
+    omega: Array,
+    shapes: Array,
+    family: Array,
+    starts: Index,
+    weight: Plane,
+    spread: Array,
+) -> int:
+    """See :func:`search_weights`; ``weight`` and ``spread`` (zeros) are filled, the last telling bin is returned."""
+    (bands, classes), count = rows.shape, omega.shape[0]
+    total, mean = np.zeros((bands * classes, count), dtype=np.float32), np.zeros((classes, count))
+    for k in range(order.shape[0]):
+        for g in range(bands * classes):
+            _add(power[order[k], g], total[g])
+    for g in range(bands * classes):
+        _add(total[g], mean[g % classes])
+    looks = np.zeros(classes)
+    for g in range(bands * classes):
+        looks[g % classes] += frames * rows[g // classes, g % classes]
+    for c in range(classes):
+        mean[c] /= looks[c]
+    noise = np.full(count, np.mean(mean[classes - 1, int(NOISE_SHARE * count) :]) + TINY)
+    texture, information = np.empty(count), np.zeros(count)
+    for c in range(classes):
+        texture_power(mean[c], noise, looks[c], shapes, family, starts, texture)
+        matched_weight(texture, noise, frames, 1.0, weight[c])
+        for f in range(count):
+            information[f] += looks[c] * weight[c, f] * texture[f] * omega[f] ** 2
+        for b in range(bands):
+            spread[b] += _squares(total[b * classes + c], weight[c]) / rows[b, c]
+    for b in range(bands):
+        spread[b] = np.sqrt(HANN_VARIANCE * (frames - 1) / frames * spread[b])
+    return _enough(information)
 
-    The noise is white, and read off the finest class.
-    """
-    tail = int(NOISE_SHARE * band.count)
-    noise = np.full(band.count, float(power[-1, tail:].mean()) + TINY)
-    shapes, family, starts = sharp_family(band.first, band.count, band.length)
-    texture = np.empty_like(power)
-    for c in range(len(power)):
-        texture_power(power[c], noise, float(looks[c]), shapes, family, starts, texture[c])
-    return texture, noise
+
+@kernel
+def _add(line: Plane, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] += line[f]
 
 
-def informative(texture: Array, weight: Array, rows: Array, band: Band) -> float:
-    """Frequency [cycles/px] beyond which hardly anything tells of the motion, in steps of a twelfth of the band.
+@kernel
+def _squares(power: Plane, weight: Plane) -> float:
+    """Sum of the squares of weighted power (f,)."""
+    total = 0.0
+    for f in range(power.shape[0]):
+        value = np.float64(power[f] * weight[f])
+        total += value * value
+    return total
 
-    What the search's rows say, with a margin, for finer rows hold finer detail. ``texture`` and ``weight`` (c, f),
-    ``rows`` (c,).
-    """
-    information = np.cumsum(rows @ (weight * texture) * band.omega() ** 2)
-    last = int(np.searchsorted(information, ENOUGH_INFORMATION * information[-1])) + band.first
-    steps = np.ceil(REACH_MARGIN * last / band.length / REACH_STEP)
-    return float(min(max(steps * REACH_STEP, LEAST_REACH), LAST_FREQUENCY))
+
+@kernel
+def _enough(information: Array) -> int:
+    """Number of frequencies after which almost all information (f,) is in; it is summed up in place."""
+    for f in range(1, information.shape[0]):
+        information[f] += information[f - 1]
+    return int(np.searchsorted(information, ENOUGH_INFORMATION * information[-1]))

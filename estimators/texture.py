@@ -26,7 +26,7 @@ SINGLE_GROUPS = 12
 GROUP_GROWTH = 1.07
 NOISE_BLOCKS = 10
 PASSES = 3
-NOISE_FLOOR, TINY = 1e-3, 1e-12
+NOISE_FLOOR, BLUR_FLOOR, TINY = 1e-3, 1e-4, 1e-12
 STEPS = np.array([(-1, 0), (1, 0), (0, -1), (0, 1), (-1, 1), (1, -1)])  # slopes, lenses; steep and sharp look alike
 
 
@@ -72,9 +72,13 @@ def sharp_family(first: int, count: int, length: int) -> tuple[Array, Array, Ind
     return shapes, family, starts
 
 
-def blur_power(length_px: float, frequency: Array) -> Array:
-    """Power transfer of a uniform blur, ``sinc(f l)^2``, with a floor that keeps its zeros harmless."""
-    return np.asarray(np.sinc(length_px * frequency) ** 2 + 1e-4)
+@kernel
+def blur_power(length_px: float, omega: Array, out: Array) -> None:
+    """Power transfer of a uniform blur at ``omega`` [rad/px], with a floor that keeps its zeros harmless."""
+    for f in range(out.shape[0]):
+        half = 0.5 * length_px * omega[f]
+        ratio = np.sin(half) / half if half > TINY else 1.0
+        out[f] = ratio * ratio + BLUR_FLOOR
 
 
 @kernel
@@ -244,6 +248,8 @@ def smooth_spectra(
             out[0, c, f] *= blur[f]
 
 
-def matched_weight(texture: Array, noise: Array, frames: int) -> Array:
-    """``q / (s (s + N q))`` for every frequency."""
-    return np.asarray(texture / (noise * (noise + frames * texture)))
+@kernel
+def matched_weight(texture: Array, noise: Array, frames: int, factor: float, out: Plane) -> None:
+    """``q / (s (s + N q))`` times a factor for every frequency (f,)."""
+    for f in range(out.shape[0]):
+        out[f] = factor * texture[f] / (noise[f] * (noise[f] + frames * texture[f]))
