@@ -24,14 +24,16 @@ from axialnav.estimators.spectrum import Band
 from axialnav.estimators.whittle import parabola
 
 Array = NDArray[np.float64]
-Plane = NDArray[np.float32]
 OFFSETS, STEP_PX = 48, 0.2  # the step is that of the outermost frames
+COARSEST = 480  # frequencies that are enough; those of long windows are taken together
 
 
 def coherence_px(fit: Fit, products: Products) -> float:
     """Offset [px per frame] at which a part of the picture pulls the hardest at a fit to these products."""
-    power = (products.rows.sum(axis=0) @ (fit.weight * fit.texture)).astype(np.float32)
-    offset, basis = _pulls(products.band.length, products.frames)
+    power = products.rows.sum(axis=0) @ (fit.weight * fit.texture)
+    size = max(1, products.band.length // COARSEST)
+    power = power[: len(power) // size * size].reshape(-1, size).sum(axis=1)
+    offset, basis = _pulls(products.band.length, size, products.frames)
     pull = basis[:, : len(power)] @ power
     k = int(np.argmax(pull))
     if not 0 < k < OFFSETS - 1:
@@ -40,10 +42,14 @@ def coherence_px(fit: Fit, products: Products) -> float:
 
 
 @lru_cache(maxsize=64)
-def _pulls(length: int, frames: int) -> tuple[Array, Plane]:
-    """Offsets (d,) [px per frame] and the pull of unit power there at every frequency (d, f), not to be written to."""
+def _pulls(length: int, size: int, frames: int) -> tuple[Array, Array]:
+    """Offsets (d,) [px per frame] and the pull of unit power there at every ``size`` frequencies (d, g).
+
+    Not to be written to.
+    """
     omega = Band(length).omega()
+    omega = omega[: len(omega) // size * size].reshape(-1, size).mean(axis=1)
     offset = np.arange(1, OFFSETS + 1) * STEP_PX / (frames - 1)
     angle = np.outer(offset, omega)
-    pull = omega * sum((frames - lag) * lag * np.sin(lag * angle) for lag in range(1, frames))
-    return offset, pull.astype(np.float32)
+    lags = range(1, frames)
+    return offset, omega * sum((frames - lag) * lag * np.sin(lag * angle) for lag in lags)

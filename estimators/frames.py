@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
 from axialnav.estimators.options import MIN_SIDE_PX, check_axis, check_count
 from axialnav.estimators.result import MotionReason
-from axialnav.models.jit import kernel
 
 Image = NDArray[np.unsignedinteger[Any]]
 Frames = NDArray[np.generic] | Sequence[NDArray[np.generic]]
 MAX_SATURATED = 0.2
 DARK_DN = 1
 FULL_DN = 255
-PROBE = 8  # every 8th pixel of every 8th row decides about saturation and darkness
+PROBE = 8  # every 8th row decides about saturation and darkness
 
 
 def luma(image: NDArray[np.generic]) -> Image:
@@ -90,30 +90,15 @@ def unusable(image: Image) -> str:
 
     A sensor of any depth saturates at a number of the form 2^n - 1.
     """
-    low, top, full = _probe(image)
+    probed = image[::PROBE]
+    low, top = (int(value) for value in cv2.minMaxLoc(probed)[:2])
     if top <= DARK_DN and int(image.max()) <= DARK_DN:
         return MotionReason.DARK
-    if top >= FULL_DN and top & (top + 1) == 0 and full > MAX_SATURATED:
+    if top >= FULL_DN and top & (top + 1) == 0 and np.count_nonzero(probed == top) > MAX_SATURATED * probed.size:
         return MotionReason.SATURATED
     if low == top and int(image.min()) == int(image.max()):
         return MotionReason.NO_TEXTURE
     return ""
-
-
-@kernel
-def _probe(image: Image) -> tuple[int, int, float]:
-    """Least and largest number among the probed pixels, and the share of the largest."""
-    low, top, full, count = int(image[0, 0]), 0, 0, 0
-    for r in range(0, image.shape[0], PROBE):
-        line = image[r]
-        for c in range(0, image.shape[1], PROBE):
-            value = int(line[c])
-            low = min(low, value)
-            if value > top:
-                top, full = value, 0
-            full += value == top
-            count += 1
-    return low, top, full / count
 
 
 def same_picture(first: Image, second: Image) -> bool:

@@ -59,15 +59,19 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
     if not every_band:
         everyone = np.ones(bands, dtype=np.bool_)
         return Choice(likeliest, everyone, ~everyone)
-    peaks = gain.argmax(axis=1)
-    best = gain[np.arange(bands), peaks]
+    best = gain.max(axis=1)
     sure = best > SURE * profiles.spread
+
+    def against(candidate: int) -> Mask:
+        """Bands that oppose a grid point."""
+        return np.asarray(sure & (best - gain[:, profiles.near(candidate, REACH_PX)].max(axis=1) > OPPOSED * SOFTENING))
+
+    opposed = against(likeliest)
+    if not opposed.any():
+        return Choice(likeliest, ~opposed, opposed)  # no other can have fewer opponents or be more likely
     choices = []
-    for candidate in (likeliest, *sorted(set(peaks[sure].tolist()) - {likeliest})):
-        near = profiles.near(candidate, REACH_PX)
-        opposed = sure & ((best - gain[:, near].max(axis=1)) / SOFTENING > OPPOSED)
-        if candidate == likeliest and not opposed.any():
-            return Choice(likeliest, ~opposed, opposed)  # no other can have fewer opponents or be more likely
+    for candidate in sorted({likeliest, *gain[sure].argmax(axis=1).tolist()}):
+        near, opposed = profiles.near(candidate, REACH_PX), against(candidate)
         place = near.start + int(np.argmax(gain[~opposed, near].sum(axis=0))) if not opposed.all() else candidate
         likelihood = float(gain[~opposed, place].sum())
         choices.append((int(opposed.sum()), -likelihood, place, opposed))

@@ -127,21 +127,27 @@ def binned_coefficients(
     for block in range(place.shape[0] // size):
         for j in range(size):
             sum_rows(frame, first_row + (block * size + j) * height, height, sums, work[j])
-        many = size
-        while many > 1:
-            half = many // 2
+        step = 1
+        while step < size:
+            half = size // (2 * step)
             for j in range(half):
-                _butterfly(work[2 * j], work[2 * j + 1], out[place[block * size + half + j]], work[j])
-            many = half
+                first, second = work[2 * step * j], work[2 * step * j + step]
+                _difference(first, second, out[place[block * size + half + j]])
+                _join(second, first)
+            step *= 2
         out[place[block * size]] = work[0]
 
 
 @kernel
-def _butterfly(first: Plane, second: Plane, difference: Plane, total: Plane) -> None:
-    for c in range(first.shape[0]):
-        a, b = first[c], second[c]
-        difference[c] = (a - b) * ROOT_HALF
-        total[c] = (a + b) * ROOT_HALF
+def _difference(first: Plane, second: Plane, out: Plane) -> None:
+    for c in range(out.shape[0]):
+        out[c] = (first[c] - second[c]) * ROOT_HALF
+
+
+@kernel
+def _join(line: Plane, total: Plane) -> None:
+    for c in range(total.shape[0]):
+        total[c] = (total[c] + line[c]) * ROOT_HALF
 
 
 @kernel

@@ -25,6 +25,7 @@ TINY = 1e-12
 NOISE_SHARE = 0.85  # above this share of the frequencies the fixed windows hold mostly noise
 ENOUGH_INFORMATION, REACH_MARGIN, REACH_STEP = 0.98, 1.25, LAST_FREQUENCY / 12
 LEAST_REACH = 0.5 * LAST_FREQUENCY  # noise and patterns of the pixels are seen above the texture
+LEAST_ABOVE, MOST_ABOVE = -30.0, 50.0  # log-likelihoods beyond which a mass is none, and all
 HANN_VARIANCE = 1.94  # of a sum over neighbouring bins, which a Hann window makes dependent
 
 
@@ -64,15 +65,15 @@ class Profiles:
         return self.everyone if bands.all() else np.asarray(bands.astype(np.float32) @ self.gain)
 
     def near(self, index: int, reach_px: float) -> slice:
-        """Grid points within ``reach_px`` of a grid point."""
-        steps = int(reach_px / (self.grid_px[1] - self.grid_px[0]) + 1e-9)
+        """Grid points within ``reach_px`` of a grid point, or a little more."""
+        steps = math.ceil(reach_px / float(self.grid_px[1] - self.grid_px[0]))
         return slice(max(0, index - steps), index + steps + 1)
 
     def peak_px(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Displacement at the top of a parabola through the total at a grid point and its neighbours."""
         if not 0 < index < len(self.grid_px) - 1:
             return float(self.grid_px[index])
-        left, middle, right = (float(gain) for gain in bands.astype(np.float64) @ self.gain[:, index - 1 : index + 2])
+        left, middle, right = self.total(bands)[index - 1 : index + 2].tolist()
         bend = 2.0 * middle - left - right
         shift = 0.5 * (right - left) / bend if bend > 0.0 else 0.0
         step = float(self.grid_px[1] - self.grid_px[0])
@@ -80,7 +81,8 @@ class Profiles:
 
     def significance(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Height of the total at a grid point in standard deviations of unrelated frames."""
-        return float(self.gain[bands, index].sum() / np.sqrt(np.sum(self.spread[bands] ** 2)))
+        spread = self.spread[bands]
+        return float(self.total(bands)[index]) / math.sqrt(float(spread @ spread))
 
     def rivals(self, index: int, bands: NDArray[np.bool_]) -> tuple[float, float]:
         """What speaks for displacements other than that of a grid point.
@@ -88,13 +90,26 @@ class Profiles:
         Posterior mass further than 1 px from it under the softened likelihood, and the highest total further than 8 px
         away over the total there [-].
         """
-        total = self.total(bands)
-        mass = np.exp(np.minimum((total - total[index]) * np.float32(1.0 / SOFTENING), np.float32(50.0)))
         near, apart = self.near(index, NEAR_PX), self.near(index, RIVAL_PX)
-        whole = float(mass.sum())
-        far = [float(part.max()) for part in (total[: apart.start], total[apart.stop :]) if len(part)]
-        share = max(far) / float(total[index]) if far and total[index] > 0.0 else 0.0
-        return (whole - float(mass[near].sum())) / whole, share
+        return _rivals(self.total(bands), index, np.array([near.start, near.stop, apart.start, apart.stop]))
+
+
+@kernel
+def _rivals(total: Plane, index: int, edges: Index) -> tuple[float, float]:
+    """See :meth:`Profiles.rivals`: what is near lies between the first two ``edges``, what is far beyond the others."""
+    outside, inside, highest = 0.0, 0.0, np.float32(-np.inf)
+    for d in range(total.shape[0]):
+        above = (total[d] - total[index]) / SOFTENING
+        if above > LEAST_ABOVE:
+            mass = np.exp(min(above, MOST_ABOVE))
+            if edges[0] <= d < edges[1]:
+                inside += mass
+            else:
+                outside += mass
+        if d < edges[2] or d >= edges[3]:
+            highest = max(highest, total[d])
+    share = highest / total[index] if total[index] > 0.0 and highest > -np.inf else 0.0
+    return outside / (inside + outside), share
 
 
 class LagTransform:

@@ -75,8 +75,9 @@ def pair_count(frames: int) -> int:
     return frames * (frames - 1) // 2
 
 
+@lru_cache(maxsize=64)
 def pair_frames(frames: int) -> NDArray[np.int64]:
-    """Frames i and j of every pair in the order of the pair axis, shape (pairs, 2)."""
+    """Frames i and j of every pair in the order of the pair axis, shape (pairs, 2); shared, not to be written to."""
     return np.array([(i, j) for i in range(frames) for j in range(i + 1, frames)], dtype=np.int64).reshape(-1, 2)
 
 
