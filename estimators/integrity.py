@@ -64,7 +64,7 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
 
     def against(candidate: int) -> Mask:
         """Bands that oppose a grid point."""
-        return np.asarray(sure & (best - gain[:, profiles.near(candidate, REACH_PX)].max(axis=1) > OPPOSED * SOFTENING))
+        return np.asarray(sure & (best - profiles.highest(candidate, REACH_PX) > OPPOSED * SOFTENING))
 
     opposed = against(likeliest)
     if not opposed.any():

@@ -65,9 +65,19 @@ class Profiles:
         return self.everyone if bands.all() else np.asarray(bands.astype(np.float32) @ self.gain)
 
     def near(self, index: int, reach_px: float) -> slice:
-        """Grid points within ``reach_px`` of a grid point, or a little more."""
-        steps = math.ceil(reach_px / float(self.grid_px[1] - self.grid_px[0]))
+        """Grid points within ``reach_px`` of a grid point."""
+        steps = int(reach_px / float(self.grid_px[1] - self.grid_px[0]))
         return slice(max(0, index - steps), index + steps + 1)
+
+    def highest(self, index: int, reach_px: float) -> Plane:
+        """Highest likelihood of every band within ``reach_px`` of a grid point, interpolated at the border, (b,)."""
+        near, share = self.near(index, reach_px), reach_px / float(self.grid_px[1] - self.grid_px[0]) % 1.0
+        found = self.gain[:, near].max(axis=1)
+        for inner, outer in ((near.start, near.start - 1), (near.stop - 1, near.stop)) if share else ():
+            if 0 <= outer < len(self.grid_px):
+                border = self.gain[:, inner] + np.float32(share) * (self.gain[:, outer] - self.gain[:, inner])
+                found = np.maximum(found, border)
+        return np.asarray(found)
 
     def peak_px(self, index: int, bands: NDArray[np.bool_]) -> float:
         """Displacement at the top of a parabola through the total at a grid point and its neighbours."""

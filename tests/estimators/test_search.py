@@ -8,8 +8,9 @@ import pytest
 from axialnav.estimators.integrity import choose
 from axialnav.estimators.measure import JointOptions, doubt_search, search_grid
 from axialnav.estimators.result import MotionReason
-from axialnav.estimators.search import NEAR_PX, SOFTENING, Profiles
-from axialnav.estimators.texture import matched_weight
+from axialnav.estimators.search import HANN_VARIANCE, LEAST_REACH, NEAR_PX, SOFTENING, Profiles, search_weights
+from axialnav.estimators.spectrum import Band
+from axialnav.estimators.texture import matched_weight, sharp_family
 
 GRID_PX = search_grid(400, 5, None)
 EVERY = np.ones(5, dtype=np.bool_)
@@ -18,7 +19,7 @@ EVERY = np.ones(5, dtype=np.bool_)
 def profiles(*hills: tuple[float, float], bands: int = 5, spread: float = 1.0) -> Profiles:
     """Bands that all have hills of these heights at these places [px], one pixel wide."""
     gain = sum(height * np.exp(-0.5 * ((GRID_PX - place) / 0.7) ** 2) for place, height in hills)
-    return Profiles(GRID_PX, np.repeat(gain[None], bands, axis=0), np.full(bands, spread))
+    return Profiles(GRID_PX, np.repeat(gain[None], bands, axis=0).astype(np.float32), np.full(bands, spread))
 
 
 def doubt(found: Profiles, prior_px: tuple[float, float] | None = None) -> str:
@@ -78,5 +79,31 @@ def test_the_whole_range_is_searched_without_a_prior() -> None:
 
 def test_weights_are_the_matched_ones() -> None:
     rng = np.random.default_rng(3)
-    q, s = rng.uniform(0.1, 9.0, (2, 50))
-    np.testing.assert_allclose(matched_weight(q, s, 5), q / (s * (s + 5 * q)))
+    (q, s), found = rng.uniform(0.1, 9.0, (2, 50)), np.empty(50, dtype=np.float32)
+    matched_weight(q, s, 5, 0.7, found)
+    np.testing.assert_allclose(found, 0.7 * q / (s * (s + 5 * q)), rtol=1e-6)
+
+
+def test_the_weights_of_a_search_are_those_of_the_spectra_that_made_it() -> None:
+    """Their spread is that of unrelated frames, and they end where the texture drowns."""
+    rng, band, rows = np.random.default_rng(4), Band(400), np.full((5, 1), 9.0)
+    shapes, _, _ = sharp_family(band.first, band.count, band.length)
+    q, s = 300.0 * shapes[9], np.full(band.count, 2.0)
+    power = (q + s) * rng.gamma(9.0, 1.0, (4, 5, band.count))
+    slots = np.array([3, 0, 2])
+    weight, spread, reach = search_weights(power.astype(np.float32), slots, 3, rows, band)
+    matched = q / (s * (s + 3 * q))
+    np.testing.assert_allclose(weight[0, :20], matched[:20], rtol=0.1)
+    variance = np.sum((weight * power[slots].sum(axis=0)) ** 2 / rows, axis=1)
+    np.testing.assert_allclose(spread, np.sqrt(HANN_VARIANCE * 2.0 / 3.0 * variance), rtol=1e-4)
+    information = np.cumsum(matched * q * band.omega() ** 2)
+    enough = band.frequency()[np.searchsorted(information, 0.98 * information[-1])]
+    assert enough < reach <= max(1.4 * enough + 0.04, LEAST_REACH)
+
+
+def test_the_border_of_a_coarse_grid_is_interpolated() -> None:
+    gain = np.array([[0.0, 1.0, 5.0, 9.0, 2.0]], dtype=np.float32)
+    found = Profiles(0.5 * np.arange(5), gain, np.ones(1))
+    assert found.highest(1, 0.75)[0] == 7.0
+    assert found.highest(1, 1.0)[0] == 9.0
+    assert found.highest(0, 0.75)[0] == 3.0
