@@ -23,6 +23,7 @@ T = TypeVar("T")
 MAX_BYTES = 16 << 20
 _UNKNOWN = re.compile(r"unknown field `(?P<field>[^`]+)`(?: - at `(?P<path>[^`]+)`)?")
 _NO_CHOICE = re.compile(r"Invalid enum value .*, at `[^`]*?(?P<field>\w+)(?:\[[^`]*\])*`")
+_NAMELESS = re.compile(r"`\$(?P<path>(?:\.\w+)*)\[\.\.\.\]")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -40,7 +41,28 @@ def decode(data: Mapping[str, Any], kind: type[T], *, where: str) -> T:
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{where}: {_explain(str(error), kind)}") from None
+        raise ConfigError(f"{where}: {_explain(_located(str(error), data, kind), kind)}") from None
+
+
+def _located(message: str, data: Mapping[str, Any], kind: type[Any]) -> str:
+    """A message of msgspec's with the name of the table, for which it says ``[...]``."""
+    found = _NAMELESS.search(message)
+    if found is None:
+        return message
+    keys = found["path"].split(".")[1:]
+    tables: Any = data
+    for key in keys:
+        tables = tables[key]
+    for name, table in tables.items():
+        alone: Any = {name: table}
+        for key in reversed(keys):
+            alone = {key: alone}
+        try:
+            msgspec.convert(alone, kind)
+        except msgspec.ValidationError as error:
+            if str(error) == message:
+                return message.replace("[...]", f".{name}", 1)
+    return message
 
 
 def _not_numbers(node: Any, path: str) -> Iterator[str]:

@@ -30,6 +30,8 @@ class Sensor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     rate_hz: float | None = None
 
     def __post_init__(self) -> None:
+        if self.rate_hz is not None and not 0.0 < self.rate_hz < math.inf:
+            raise ValueError(f"rate_hz must be positive and finite, got {self.rate_hz:g}; correct it or leave it out")
         matrix = np.array(self.T_BS, dtype=np.float64).reshape(4, 4)
         strange = np.flatnonzero(~np.isfinite(matrix.ravel()))
         if strange.size:

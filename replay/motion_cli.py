@@ -62,32 +62,24 @@ def motion_command(
     trials
         Windows per condition of the experiment; its own number if not given.
     """
+    options: dict[str, Any] = {
+        "method": method, "frames": frames, "camera": camera, "axis": axis, "distance_m": distance_m,
+        "undistort": undistort,
+    }  # fmt: skip
     if experiment is not None:
-        if flight is not None:
-            raise ConfigError(
-                f"--experiment {experiment} renders its own walls and takes no flight; leave out {flight}"
-            )
-        _refuse_options(
-            experiment,
-            method=method,
-            frames=frames,
-            camera=camera,
-            axis=axis,
-            distance_m=distance_m,
-            undistort=undistort,
-        )
+        _refuse_options(experiment, flight, options)
         return _experiment(experiment, out or Path("runs") / experiment, 1 if seed is None else seed, trials)
     if flight is None:
         raise ConfigError("motion needs a flight folder, or --experiment NAME")
     if seed is not None or trials is not None:
         raise ConfigError("--seed and --trials belong to an experiment; leave them out, or add --experiment NAME")
-    return _measure(
-        flight, out, method=method, frames=frames, camera=camera, axis=axis, distance_m=distance_m, undistort=undistort
-    )
+    return _measure(flight, out, **options)
 
 
-def _refuse_options(experiment: str, **options: Any) -> None:
+def _refuse_options(experiment: str, flight: Path | None, options: dict[str, Any]) -> None:
     """An experiment brings its own methods and pictures: what was asked for besides would be ignored."""
+    if flight is not None:
+        raise ConfigError(f"--experiment {experiment} renders its own walls and takes no flight; leave out {flight}")
     usual = signature(motion_command).parameters
     other = [f"--{name.replace('_', '-')}" for name, value in options.items() if value != usual[name].default]
     if other:

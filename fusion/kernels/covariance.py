@@ -25,7 +25,6 @@ from axialnav.models.state import E_UWB_BIAS, N_CORE, N_ERROR, QUAT
 
 Array = NDArray[np.float64]
 N = N_ERROR
-CORE = N_CORE
 
 
 @apart_kernel
@@ -37,10 +36,10 @@ def predict_covariance(P: Array, F: Array, dt: float, uwb_decay: float, Q: Array
     """
     _predict_rows_of_core(P, F, dt)
     _predict_rows_beside(P, F, dt)
-    for i in range(CORE):
+    for i in range(N_CORE):
         _predict_columns(i, P[i], F, dt)
-    for i in range(CORE):
-        for j in range(i + 1, CORE):
+    for i in range(N_CORE):
+        for j in range(i + 1, N_CORE):
             P[j, i] = P[i, j]
     _fade(P, uwb_decay, uwb_decay * uwb_decay)
     for i in range(N):
@@ -53,7 +52,7 @@ def _fade(P: Array, decay: float, decay2: float) -> None:
     for j in range(E_UWB_BIAS, N):
         for i in range(E_UWB_BIAS):
             P[i, j] *= decay
-    for j in range(CORE, E_UWB_BIAS):
+    for j in range(N_CORE, E_UWB_BIAS):
         for i in range(E_UWB_BIAS, N):
             P[i, j] *= decay
     for j in range(E_UWB_BIAS, N):
@@ -65,14 +64,14 @@ def _fade(P: Array, decay: float, decay2: float) -> None:
 def _predict_rows_of_core(P: Array, F: Array, dt: float) -> None:
     """Apply ``Phi`` from the left to the 9x9 core, as far as the upper triangle needs it."""
     for i in range(3):
-        for j in range(CORE):
+        for j in range(N_CORE):
             P[i, j] += dt * P[3 + i, j]
     for i in range(3):
         f0, f1, f2 = F[i, 0], F[i, 1], F[i, 2]
         b0, b1, b2 = F[3 + i, 0], F[3 + i, 1], F[3 + i, 2]
-        for j in range(3, CORE):
+        for j in range(3, N_CORE):
             P[3 + i, j] += f0 * P[6, j] + f1 * P[7, j] + f2 * P[8, j] - b0 * P[j, 12] - b1 * P[j, 13] - b2 * P[j, 14]
-    for j in range(6, CORE):
+    for j in range(6, N_CORE):
         t0, t1, t2 = P[6, j], P[7, j], P[8, j]
         for i in range(3):
             P[6 + i, j] = F[6 + i, 0] * t0 + F[6 + i, 1] * t1 + F[6 + i, 2] * t2 - dt * P[j, 9 + i]
@@ -84,7 +83,7 @@ def _predict_rows_beside(P: Array, F: Array, dt: float) -> None:
     for i in range(3):
         f0, f1, f2 = F[i, 0], F[i, 1], F[i, 2]
         b0, b1, b2 = F[3 + i, 0], F[3 + i, 1], F[3 + i, 2]
-        for j in range(CORE, N):
+        for j in range(N_CORE, N):
             v = P[3 + i, j]
             P[i, j] += dt * v
             P[3 + i, j] = v + (
@@ -94,7 +93,7 @@ def _predict_rows_beside(P: Array, F: Array, dt: float) -> None:
     r0, r1, r2 = F[6, 0], F[6, 1], F[6, 2]
     s0, s1, s2 = F[7, 0], F[7, 1], F[7, 2]
     u0, u1, u2 = F[8, 0], F[8, 1], F[8, 2]
-    for j in range(CORE, N):
+    for j in range(N_CORE, N):
         t0, t1, t2 = P[6, j], P[7, j], P[8, j]
         P[6, j] = r0 * t0 + r1 * t1 + r2 * t2 - dt * P[9, j]
         P[7, j] = s0 * t0 + s1 * t1 + s2 * t2 - dt * P[10, j]
@@ -123,17 +122,17 @@ def project(P: Array, H: Array, PHt: Array) -> float:
     """Write ``P H'`` into ``PHt`` (25,) and return ``H P H'``; zeros of the row ``H`` (25,) cost nothing."""
     for j in range(N):
         PHt[j] = 0.0
-    for k in range(CORE):
+    for k in range(N_CORE):
         h = H[k]
         if h != 0.0:
             for j in range(N):
                 PHt[j] += h * P[k, j]
-    for k in range(CORE, N):
+    for k in range(N_CORE, N):
         h = H[k]
         if h != 0.0:
-            for j in range(CORE):
+            for j in range(N_CORE):
                 PHt[j] += h * P[j, k]
-            for j in range(CORE, N):
+            for j in range(N_CORE, N):
                 PHt[j] += h * P[k, j]
     variance = 0.0
     for k in range(N):
@@ -152,13 +151,13 @@ def correct(x: Array, P: Array, PHt: Array, S: float, innovation: float, gain: A
     root = 1.0 / math.sqrt(S)
     for i in range(N):
         gain[i] = PHt[i] * root
-    for i in range(CORE):
+    for i in range(N_CORE):
         r = gain[i]
         for j in range(N):
             P[i, j] -= r * gain[j]
-    for i in range(CORE, N):
+    for i in range(N_CORE, N):
         r = gain[i]
-        for j in range(CORE, N):
+        for j in range(N_CORE, N):
             P[i, j] -= r * gain[j]
     for i in range(N):
         gain[i] *= root
@@ -178,6 +177,6 @@ def inject(x: Array, gain: Array, innovation: float) -> None:
 @kernel
 def complete(P: Array) -> None:
     """Fill in the block of ``P`` (25, 25) below the core."""
-    for i in range(CORE):
-        for j in range(CORE, N):
+    for i in range(N_CORE):
+        for j in range(N_CORE, N):
             P[j, i] = P[i, j]

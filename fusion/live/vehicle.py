@@ -186,9 +186,6 @@ class Vehicle(_Table, frozen=True, kw_only=True):
                 raise ValueError(
                     f"{key} = {name!r} is not a {kind.__name__} described in [filter.sensor]; there are {known}"
                 )
-        for name, sensor in self.filter.sensor.items():
-            if sensor.rate_hz is not None and not sensor.rate_hz > 0.0:
-                raise ValueError(f"filter.sensor.{name}.rate_hz must be more than 0, got {sensor.rate_hz:g}")
         if self.output.content == "axial" and self.mavlink.profile != "px4":
             raise ValueError(
                 'output.content = "axial" is for profile "px4": ArduPilot takes all three axes of a velocity or none; '

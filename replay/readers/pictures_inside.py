@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,22 @@ def stamps_of(pictures: Sequence[Callable[[], Payload]], definition: str) -> NDA
         seconds, nanoseconds = struct.unpack_from(f"{order}iI", payload, place)
         stamps.append(seconds * 1_000_000_000 + nanoseconds)
     return np.array(stamps, dtype=np.int64)
+
+
+def pictures_in_order(
+    pictures: Sequence[Callable[[], Payload]], kind: str, definition: str, where: str
+) -> tuple[NDArray[np.int64], Callable[[], Iterator[NDArray[np.generic]]]]:
+    """Stamps of pictures in their order [ns], and a function that goes through the pictures, fetching one at a time."""
+    stamps = stamps_of(pictures, definition)
+    order = np.argsort(stamps, kind="stable")
+    message = PictureMessage(kind, definition, where)
+
+    def each() -> Iterator[NDArray[np.generic]]:
+        """Pictures one by one, each fetched when it is asked for."""
+        for k in order.tolist():
+            yield message.decode(pictures[k]())
+
+    return stamps[order], each
 
 
 class PictureMessage:

@@ -20,8 +20,8 @@ from axialnav.models.rig import Camera, Uwb
 from axialnav.replay.convert.messages import EVALUATION_KEYS, GPS_TOPIC, GPS_TYPE, TRUTH_TOPIC, TRUTH_TYPE
 from axialnav.replay.flight import ANCHOR_FIELDS, Flight, GpsReference, SensorTable, Stamps, Truth
 from axialnav.replay.readers.dropped import DropLog
-from axialnav.replay.readers.mcap_records import Payload, Topic
-from axialnav.replay.readers.pictures_inside import PictureMessage, stamps_of
+from axialnav.replay.readers.mcap_records import Topic
+from axialnav.replay.readers.pictures_inside import pictures_in_order
 
 _OWN = {OWN + kind.__name__: kind for kind in OWN_READINGS}
 MOTION = OWN + "PixelMotion"
@@ -184,24 +184,16 @@ def _camera(
     topic: Topic, exposures: Topic | None, path: Path
 ) -> tuple[SensorTable, Callable[[], Iterator[NDArray[np.generic]]]]:
     """Table of a camera, and a function that goes through its pictures in the order of the table."""
-    stamps = stamps_of(topic.pictures, topic.definition)
-    order = np.argsort(stamps, kind="stable")
-    message = PictureMessage(topic.type, topic.definition, f"{path}: {topic.name}")
+    where = f"{path}: {topic.name}"
+    stamps, pictures = pictures_in_order(topic.pictures, topic.type, topic.definition, where)
     times = np.full(len(stamps), np.nan)
     if exposures is not None and exposures.type == EXPOSURE:
         part = _part(exposures, DropLog())
         if part is not None:
             known = dict(zip(part.t_ns.tolist(), part.columns["exposure_s"].tolist(), strict=True))
-            times = np.array([known.get(t, np.nan) for t in stamps[order].tolist()])
-    fetch: list[Callable[[], Payload]] = [topic.pictures[k] for k in order.tolist()]
-
-    def pictures() -> Iterator[NDArray[np.generic]]:
-        """Pictures one by one, each fetched when it is asked for."""
-        for one in fetch:
-            yield message.decode(one())
-
-    names = np.array([f"{t}.png" for t in stamps[order].tolist()], dtype=np.str_)
-    return SensorTable(stamps[order], {"filename": names, "exposure_s": times}), pictures
+            times = np.array([known.get(t, np.nan) for t in stamps.tolist()])
+    names = np.array([f"{t}.png" for t in stamps.tolist()], dtype=np.str_)
+    return SensorTable(stamps, {"filename": names, "exposure_s": times}), pictures
 
 
 def _truth(topic: Topic | None, drops: DropLog) -> Truth | None:

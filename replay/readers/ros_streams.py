@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from axialnav.replay.flight import Flight
 from axialnav.replay.readers.assemble import Assembly
 from axialnav.replay.readers.dropped import DropLog
 from axialnav.replay.readers.mapping import load_mapping
-from axialnav.replay.readers.mcap_records import Payload, Topic
-from axialnav.replay.readers.pictures_inside import PictureMessage, stamps_of
+from axialnav.replay.readers.mcap_records import Topic
+from axialnav.replay.readers.pictures_inside import pictures_in_order
 from axialnav.replay.readers.recorded import decode_topic, stamps_ns
 from axialnav.replay.readers.streams import Stream
 
@@ -55,14 +54,6 @@ def _stream(topic: Topic, drops: DropLog) -> Stream | None:
 
 
 def _picture_stream(topic: Topic, path: Path) -> Stream:
-    stamps = stamps_of(topic.pictures, topic.definition)
-    order = np.argsort(stamps, kind="stable")
-    message = PictureMessage(topic.type, topic.definition, f"{path}: {topic.name}")
-    fetch: list[Callable[[], Payload]] = [topic.pictures[k] for k in order.tolist()]
-
-    def pictures() -> Iterator[NDArray[np.generic]]:
-        """Pictures one by one, each fetched when it is asked for."""
-        for one in fetch:
-            yield message.decode(one())
-
-    return Stream(topic.name, topic.type, stamps[order], {}, pictures)
+    where = f"{path}: {topic.name}"
+    stamps, pictures = pictures_in_order(topic.pictures, topic.type, topic.definition, where)
+    return Stream(topic.name, topic.type, stamps, {}, pictures)
