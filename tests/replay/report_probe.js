@@ -21,6 +21,12 @@ const use = async () => {
   const found = { drawn: plots.filter((plot) => plot.data).length, plots: plots.length };
   found.overflow = document.documentElement.scrollWidth - document.documentElement.clientWidth;
   found.width = window.innerWidth;
+  found.touching = plots.filter((plot) => {
+    const [bar, legend] = [".modebar-group", ".legend .bg"].map((part) => plot.querySelector(part));
+    if (!bar || !legend) return false;
+    const [a, b] = [bar.getBoundingClientRect(), legend.getBoundingClientRect()];
+    return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  }).map((plot) => plot.layout.yaxis.title.text);
   found.paper = getComputedStyle(document.body).backgroundColor;
   found.ink = plots[0].layout.font.color;
   const time = plots.filter((plot) => plot.layout.xaxis.title.text.startsWith("time"));

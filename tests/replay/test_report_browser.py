@@ -56,6 +56,8 @@ def test_the_page_can_be_used(tmp_path: Path, width: int, flags: tuple[str, ...]
     assert found["drawn"] == found["plots"] > 10
 
     assert found["width"] == width
+    if width == PHONE_PX:
+        assert found["touching"] == []  # no legend lies under the buttons
     assert found["overflow"] == 0  # nothing to scroll sideways
 
     brightness = sum(map(int, re.findall(r"\d+", found["paper"])[:3])) / 3

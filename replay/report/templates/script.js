@@ -4,14 +4,26 @@ const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const narrow = window.matchMedia("(max-width: 600px)");
 
 // Where the screen is narrow the buttons are always there, in a row of their own above the legend.
-const BAR_PX = 28;
+const BAR_PX = 40;
 const LEGEND_ROW_PX = 20;
+const LEGEND_MARK_PX = 40;
+const LETTER_PX = 6.2;
+const BESIDE_PX = 62;
 
-// Room above a plot on a narrow screen: the buttons, and as many rows of the legend as its entries need.
-function room(figure) {
+// Room above a plot on a narrow screen: the buttons, and as many rows of the legend as its entries need.  These stand in
+// columns as wide as the widest, but where traces are grouped one after the other.
+function room(figure, width) {
   if (!narrow.matches) return 0;
-  const entries = figure.traces.filter((trace) => trace.name && trace.showlegend !== false).length;
-  return BAR_PX + LEGEND_ROW_PX * Math.max(0, Math.ceil(entries / 3) - 1);
+  const entries = figure.traces.filter((trace) => trace.name && trace.showlegend !== false);
+  const wide = entries.map((entry) => LEGEND_MARK_PX + LETTER_PX * entry.name.length);
+  const grouped = figure.traces.some((trace) => trace.legendgroup);
+  let [rows, left] = [1, width - BESIDE_PX];
+  for (const own of wide) {
+    const needed = grouped ? own : Math.max(...wide);
+    if (needed > left) [rows, left] = [rows + 1, width - BESIDE_PX];
+    left -= needed;
+  }
+  return BAR_PX + LEGEND_ROW_PX * (rows - 1);
 }
 
 // Names of corridor sections that would be written over each other on a narrow screen are left out.
@@ -54,7 +66,7 @@ let shared = null;
 
 function draw(element) {
   const figure = figures[Number(element.dataset.figure)];
-  const extra = room(figure);
+  const extra = room(figure, element.clientWidth);
   const layout = themed(figure.layout, extra);
   layout.height += extra;
   element.style.height = `${layout.height}px`;
