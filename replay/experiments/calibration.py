@@ -101,8 +101,13 @@ def figure(path: Path, velocity: Array, lengths: dict[str, Array], line: Line | 
         longest = 1.1 * FASTEST_M_S / law_m_s_px()
         span = np.array([0.0, longest])
         above.plot(span, law_m_s_px() * span, color=INK, lw=0.8, label=f"composite law, {law_m_s_px():.4f} m/s per px")
+        fitted = PAPER[1] * span + PAPER[2]
+        above.plot(span, fitted, "--", color=INK, lw=0.8, label=f"the paper's fit, {PAPER[1]} $l_c$ + {PAPER[2]}")
+        below.plot(span, fitted - law_m_s_px() * span, "--", color=INK, lw=0.8)
         for colour, name in zip(COLOURS, FITTED, strict=False):
-            above.plot(lengths[name], velocity, "o", ms=3, color=colour, alpha=0.7, label=name)
+            beyond = int(np.sum(lengths[name] > longest))
+            label = f"{name} ({beyond} beyond the axis)" if beyond else name
+            above.plot(lengths[name], velocity, "o", ms=3, color=colour, alpha=0.7, label=label)
             below.plot(lengths[name], velocity - law_m_s_px() * lengths[name], "o", ms=3, color=colour, alpha=0.7)
         above.set(xlim=(0.0, longest), ylim=(0.0, 1.05 * FASTEST_M_S), title="velocity [m/s]")
         below.axhspan(-PAPER[3], PAPER[3], color=RULE, alpha=0.6, lw=0)
