@@ -61,14 +61,14 @@ def test_drift_across_the_rows_is_seen_and_followed() -> None:
 
 @pytest.mark.parametrize("displacement_px", [7, -23])
 def test_windows_follow_the_wall(displacement_px: int) -> None:
-    """GIVEN whole pixels of motion and no noise THEN all windows that follow show the same piece of wall."""
+    """GIVEN whole pixels of motion and no noise THEN windows that follow show one piece of wall, but for its level."""
     frames = [texture(120, 900, 1)[:, 300 - k * displacement_px :][:, :480] for k in range(5)]
     window = FrameWindow(120, 480, 5, frames[0].dtype)
     for frame in frames:
         window.push(frame)
     led, left = window.following(float(displacement_px)).total, window.following(0.0).total
-    assert np.abs(led.im).max() < 1e-4 * led.re.max()
-    assert np.abs(left.im).max() > 0.1 * left.re.max()
+    assert np.abs(led.im).max() < 0.03 * led.re.max()
+    assert np.abs(left.im).max() > 0.3 * left.re.max()
 
 
 def test_what_every_row_has_alike_is_no_wall_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
