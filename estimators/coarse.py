@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from axialnav.estimators.layout import BANDS, RowLayout
 from axialnav.estimators.rows import apply_window, fast_length, hann
-from axialnav.estimators.search import LagTransform, Profiles, search_weights
-from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
+from axialnav.estimators.search import HANN_VARIANCE, LagTransform, Profiles, search_weights
+from axialnav.estimators.spectrum import Band, add_power, pair_count, pair_products, row_spectra, still_power
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
+FINE_FROM, SURE = 0.75, 2.0
 
 
 class CoarseSearch:
@@ -53,6 +54,18 @@ class CoarseSearch:
                 self._re[other], self._im[other], self._re[slot], self._im[slot],
                 edges, self._pair_re[other, slot], self._pair_im[other, slot],
             )  # fmt: skip
+
+    def repeats(self, order: list[int]) -> bool:
+        """Whether fine detail repeats from frame to frame without moving: a pattern of the pixels, most likely.
+
+        Asked of the frequencies beyond which few walls have any detail behind a lens.
+        """
+        slots, rows = np.array(order, dtype=np.int64), self._layout.coarse_count.ravel()
+        first = int(FINE_FROM * self.band.count)
+        shared = still_power(self._pair_re, slots, first)
+        noise = self._power[slots, :, first:].mean(axis=(0, 2), dtype=np.float64)
+        looks = 0.5 * HANN_VARIANCE * pair_count(len(order)) * (self.band.count - first)
+        return shared > SURE * float(np.sqrt(looks * np.sum(noise**2 / rows)))
 
     def profiles(self, order: list[int], grid_px: Array) -> Profiles:
         """Likelihood of every displacement [px] for the frames in the slots ``order``, oldest first."""

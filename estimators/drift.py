@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from axialnav.estimators.anchor import Anchor
 from axialnav.estimators.frames import Image
-from axialnav.estimators.positions import centred_times
 from axialnav.estimators.rows import SUMMED_COLUMNS, apply_window, bin_columns, fast_length, hann
 from axialnav.estimators.search import STEP_PX, LagTransform, search_weights
 from axialnav.estimators.spectrum import Band, add_power, pair_products, row_spectra
@@ -80,46 +81,55 @@ class DriftMeter:
         self._columns = np.zeros((self._count, height), dtype=np.float32)
         self._windowed, self._packed = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
         self._spectra = np.zeros((2, frames, self._count, count), dtype=np.float32)
+        self._power = np.zeros((frames, 1, count), dtype=np.float32)
         self._pairs = np.zeros((2, frames, frames, 1, count), dtype=np.float32)
+        self._serial = np.zeros((frames, frames), dtype=np.int64)
         self._edges = np.array([0, self._count], dtype=np.int64)
         self._lags = LagTransform(1, self.band)
         reach = round(REACH_PX / STEP_PX)
         self._grid = np.asarray(STEP_PX * np.arange(-reach, reach + 1), dtype=np.float64)
 
-    def measure(self, images: list[Image], displacement_px: float) -> Drift:
-        """Drift of frames (oldest first) whose wall moves by ``displacement_px`` per frame along the rows.
+    def measure(self, images: NDArray[np.unsignedinteger[Any]], order: list[int], anchor: Anchor) -> Drift:
+        """Drift of the frames in the slots ``order``, oldest first, of ``images`` (slots, h, w).
 
-        The columns follow the wall, or there would be nothing in common between them.  Of many frames the first, the
-        middle and the last are asked.
+        The columns follow the wall with the section that is anchored to it, or there would be nothing in common between
+        them.  Of many frames the first, the middle and the last are asked.
         """
         lag = 1
-        if len(images) >= MANY_FRAMES:
-            lag = (len(images) - 1) // 2
-            images, displacement_px = images[: 2 * lag + 1 : lag], displacement_px * lag
-        found = self._measure(images, displacement_px)
-        return Drift(found.cross_px / lag, found.seen, self._stride * SIGMA_PX / lag)
-
-    def _measure(self, images: list[Image], displacement_px: float) -> Drift:
-        offset = np.rint(displacement_px * centred_times(len(images))).astype(np.int64)
-        offset -= offset.min()
-        room = images[0].shape[1] - int(offset.max()) - self._count * SUMMED_COLUMNS
+        if len(order) >= MANY_FRAMES:
+            lag = (len(order) - 1) // 2
+            order = order[: 2 * lag + 1 : lag]
+        room = anchor.length - self._count * SUMMED_COLUMNS
         if room < 0:
             return Drift(0.0, False)
         step = SUMMED_COLUMNS + room // self._count
-        squares = np.zeros((1, self.band.count), dtype=np.float32)
-        (all_re, all_im), (pair_re, pair_im) = self._spectra, self._pairs
-        for k, image in enumerate(images):
-            bin_columns(image, int(offset[k]), step, self._stride, self._columns)
-            apply_window(self._columns, self._every, 0, self._window, self._windowed)
-            row_spectra(self._windowed, self.band, self._packed, all_re[k], all_im[k])
-            add_power(all_re[k], all_im[k], self._edges, squares)
-            for i in range(k):
-                pair_products(all_re[i], all_im[i], all_re[k], all_im[k], self._edges, pair_re[i, k], pair_im[i, k])
-        return self._solve(squares, len(images))
+        for younger, slot in enumerate(order):
+            if self._serial[slot, slot] != anchor.serial[slot]:
+                self._transform(images[slot], anchor.start[slot], step, slot)
+                self._serial[slot, slot] = anchor.serial[slot]
+            for other in order[:younger]:
+                self._pair(other, slot, max(anchor.serial[other], anchor.serial[slot]))
+        found = self._solve(order)
+        return Drift(found.cross_px / lag, found.seen, self._stride * SIGMA_PX / lag)
 
-    def _solve(self, squares: Plane, frames: int) -> Drift:
-        order, rows = np.arange(frames), np.array([[float(self._count)]])
-        weight, spread, _ = search_weights(squares[None], order[:1], frames, rows, self.band)
+    def _transform(self, image: Image, first_column: int, step: int, slot: int) -> None:
+        bin_columns(image, first_column, step, self._stride, self._columns)
+        apply_window(self._columns, self._every, 0, self._window, self._windowed)
+        re, im = self._spectra[:, slot]
+        row_spectra(self._windowed, self.band, self._packed, re, im)
+        self._power[slot] = 0.0
+        add_power(re, im, self._edges, self._power[slot])
+
+    def _pair(self, i: int, j: int, serial: int) -> None:
+        """Products of an older and a younger frame; the greater of their serial numbers says whether they are known."""
+        if self._serial[i, j] != serial:
+            (all_re, all_im), (pair_re, pair_im) = self._spectra, self._pairs
+            pair_products(all_re[i], all_im[i], all_re[j], all_im[j], self._edges, pair_re[i, j], pair_im[i, j])
+            self._serial[i, j] = serial
+
+    def _solve(self, slots: list[int]) -> Drift:
+        order, rows = np.array(slots), np.array([[float(self._count)]])
+        weight, spread, _ = search_weights(self._power, order, len(slots), rows, self.band)
         found = self._lags.profiles(self._pairs[0], self._pairs[1], order, weight, self._grid, spread)
         everyone, best = np.ones(1, dtype=np.bool_), int(np.argmax(found.gain[0]))
         if best in (0, len(self._grid) - 1) or found.significance(best, everyone) < MIN_SIGNIFICANCE:

@@ -111,7 +111,8 @@ def evaluate(products: Products, weight: Plane, position_px: Array) -> tuple[Arr
     strips, frames = len(products.rows), products.frames
     score, information = np.empty((strips, frames)), np.empty((strips, frames, frames))
     coherence = np.empty((strips, pair_count(frames)))
-    position_scores(products.re, products.im, weight, products.band.omega(), position_px, score, information, coherence)
+    omega, place = products.band.omega(), products.place
+    position_scores(products.re, products.im, place, weight, omega, position_px, score, information, coherence)
     return score, information, coherence
 
 

@@ -42,7 +42,7 @@ MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
 MAX_RIVAL_SHARE = 0.75
 MAX_SIGMA_PX = 0.3
-SURELY_MOVING_PX = 2.0 * STATIC_PX  # slower motion is checked for patterns of the pixels, which are fine
+SURELY_MOVING_PX = 2.0 * STATIC_PX  # slower motion needs the fine detail in which patterns of the pixels are seen
 STRETCH_WINDOWS = 4  # a wall's slant changes slowly
 PRIOR_SIGMAS = 5.0
 PRIOR_MARGIN_PX = 1.0
@@ -122,7 +122,8 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         return refused(reason, signed=True, window_s=span_s, method="joint", bands=votes)
     start_px = found.peak_px(choice.index, choice.agree)
     strips = np.repeat(choice.agree, STRIPS // BANDS)
-    reach = found.reach if abs(start_px) > SURELY_MOVING_PX else LAST_FREQUENCY
+    slow = abs(start_px) < SURELY_MOVING_PX
+    reach = LAST_FREQUENCY if slow and window.coarse.repeats(window.order) else found.reach
     drift, products = follow(window, start_px, strips, options.exposure_ratio, reach)
     fit, lost = fit_strips(products, start_px, options.exposure_ratio, options.consensus)
     if lost + STRIPS - len(products.rows) > MAX_LOST_STRIPS:
@@ -165,7 +166,8 @@ def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, option
         return MotionReason.PAIR
     if options.evenness and uneven(fit, left):
         return MotionReason.UNEVEN
-    if abs(float(fit.motion[0])) < STATIC_PX and white(fit, products.rows.sum(axis=0)):
+    still = abs(float(fit.motion[0])) < STATIC_PX and products.band.reach == LAST_FREQUENCY
+    if still and white(fit, products.rows.sum(axis=0)):
         return MotionReason.STATIC
     if not math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, products.frames)) <= MAX_SIGMA_PX:
         return MotionReason.SIGMA

@@ -21,6 +21,7 @@ from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
+Index = NDArray[np.int64]
 LOWEST_FREQUENCY = 0.15
 SURE = 4.0
 WINDOW_VARIANCE = 1.6
@@ -87,12 +88,13 @@ def _repeated(
 def without_pattern(products: Products, power: float) -> Products:
     """The products less a white pattern of this power per row and frame."""
     re, im = products.re.copy(), products.im.copy()
-    _take_out(re, im, power * products.rows, products.band.omega(), products.offset_px, float(products.window_px))
-    return replace(products, re=re, im=im)
+    share, omega = power * products.rows, products.band.omega()
+    _take_out(re, im, products.place, share, omega, products.offset_px, float(products.window_px))
+    return replace(products, re=re, im=im, known=None)
 
 
 @kernel
-def _take_out(re: Plane, im: Plane, power: Array, omega: Array, offset: Array, window: float) -> None:
+def _take_out(re: Plane, im: Plane, place: Index, power: Array, omega: Array, offset: Array, window: float) -> None:
     """Subtract ``power`` (s, c) times the overlap of two windows, turned by their distance, from products (s, c, p, f).
 
     ``offset`` (n,) [px] says where the windows start, ``window`` [px] how long they are.
@@ -108,8 +110,8 @@ def _take_out(re: Plane, im: Plane, power: Array, omega: Array, offset: Array, w
             overlap = max(0.0, 1.0 - abs(offset[i] - offset[j]) / window)
             for s in range(re.shape[0]):
                 for k in range(re.shape[1]):
-                    _subtract(c, np.float32(power[s, k] * overlap), re[s, k, p])
-                    _subtract(d, np.float32(power[s, k] * overlap), im[s, k, p])
+                    _subtract(c, np.float32(power[s, k] * overlap), re[s, k, place[p]])
+                    _subtract(d, np.float32(power[s, k] * overlap), im[s, k, place[p]])
             p += 1
 
 

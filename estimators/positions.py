@@ -21,6 +21,7 @@ from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
+Index = NDArray[np.int64]
 
 
 @kernel
@@ -91,6 +92,7 @@ def _add(values: Plane, total: Plane) -> None:
 def position_scores(
     re: Plane,
     im: Plane,
+    place: Index,
     weight: Plane,
     omega: Array,
     position: Array,
@@ -100,8 +102,8 @@ def position_scores(
 ) -> None:
     """Fill score (s, n), information (s, n, n) and coherence (s, p) = ``sum_f w Re E`` of every strip.
 
-    Pair products ``re``, ``im`` (s, c, p, f) in the order of ``pair_frames``; their weights (c, f); ``omega`` (f,)
-    [rad/px], evenly spaced; ``position`` (n,) [px] at which to evaluate.
+    Pair products ``re``, ``im`` (s, c, p, f); ``place`` (p,) where each of ``pair_frames`` is among them; their weights
+    (c, f); ``omega`` (f,) [rad/px], evenly spaced; ``position`` (n,) [px] at which to evaluate.
     """
     strips, classes, _, count = re.shape
     frames = position.shape[0]
@@ -120,8 +122,8 @@ def position_scores(
                 sum_re[:] = np.float32(0.0)
                 sum_im[:] = np.float32(0.0)
                 for k in range(classes):
-                    _add_weighted(re[s, k, p], weight[k], sum_re)
-                    _add_weighted(im[s, k, p], weight[k], sum_im)
+                    _add_weighted(re[s, k, place[p]], weight[k], sum_re)
+                    _add_weighted(im[s, k, place[p]], weight[k], sum_im)
                 _moments(sum_re, sum_im, c, d, narrow, parts)
                 coherence[s, p], slope, bend = parts[0, 0], np.float64(parts[1, 0]), np.float64(parts[2, 0])
                 score[s, i] += 2.0 * slope
@@ -264,7 +266,7 @@ def climb(
     sum_re, sum_im = np.zeros((1, 1, pairs, count), dtype=np.float32), np.zeros((1, 1, pairs, count), dtype=np.float32)
     _add_classes(re, weight, sum_re[0, 0])
     _add_classes(im, weight, sum_im[0, 0])
-    one = np.ones((1, count), dtype=np.float32)
+    one, place = np.ones((1, count), dtype=np.float32), np.arange(pairs)
     frames, many = basis.shape
     score, information = np.empty((1, frames)), np.empty((1, frames, frames))
     coherence, position = np.empty((1, pairs)), np.empty(frames)
@@ -272,7 +274,7 @@ def climb(
     for _ in range(int(limits[2])):
         for k in range(frames):
             position[k] = np.sum(basis[k] * motion) - offset[k]
-        position_scores(sum_re, sum_im, one, omega, position, score, information, coherence)
+        position_scores(sum_re, sum_im, place, one, omega, position, score, information, coherence)
         _project(basis, score[0], information[0], g, J)
         longest = _newton_step(g, J)
         if longest < 0.0:

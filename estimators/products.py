@@ -13,13 +13,15 @@ from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Products:
     """Sums of products of row spectra for one choice of windows.
 
-    Axes: strip of the picture s, class of vertical detail c, pair of frames p, frequency f.
+    Axes: strip of the picture s, class of vertical detail c, pair of frames p, frequency f.  Pairs that are kept in a
+    ring are not in the order of the frames.
 
     Parameters
     ----------
@@ -37,6 +39,10 @@ class Products:
         Number of rows behind every sum, shape (s, c).
     height
         Place of every strip, -1 at the top of the picture, 1 at the bottom, shape (s,).
+    place
+        Where every pair i < j, in the order of :func:`~axialnav.estimators.spectrum.pair_frames`, is on the pair axis.
+    known
+        The strips summed up if that has been done already, the pairs in order.
     """
 
     re: Plane
@@ -47,6 +53,8 @@ class Products:
     window_px: int
     rows: Array
     height: Array
+    place: Index
+    known: Sums | None = None
 
     @property
     def frames(self) -> int:
@@ -69,23 +77,26 @@ class Products:
             power=self.power[strips],
             rows=self.rows[strips],
             height=self.height[strips],
+            known=None,
         )
 
     def weighted(self, weight: Plane) -> Products:
         """One class in place of all, their weighted sum; ``weight`` (c, f).  Its own memory, its power is zero."""
-        strips, _, pairs, count = self.re.shape
-        re, im = np.zeros((2, strips, 1, pairs, count), dtype=np.float32)
-        _weigh(self.re, self.im, weight, re, im)
+        strips, count, place = len(self.re), self.band.count, self.place
+        re, im = np.zeros((2, strips, 1, len(place), count), dtype=np.float32)
+        _weigh(self.re, self.im, weight, place, re, im)
         power, rows = np.zeros((strips, 1, count), dtype=np.float32), self.rows.sum(axis=1, keepdims=True)
-        return replace(self, re=re, im=im, power=power, rows=rows)
+        return replace(self, re=re, im=im, power=power, rows=rows, place=np.arange(len(place)), known=None)
 
     @cached_property
     def total(self) -> Sums:
         """The strips summed up."""
-        classes, pairs, count = self.re.shape[1:]
-        re, im = np.zeros((2, classes, pairs, count), dtype=np.float32)
+        if self.known is not None:
+            return self.known
+        classes, count = self.re.shape[1], self.band.count
+        re, im = np.zeros((2, classes, len(self.place), count), dtype=np.float32)
         power = np.zeros((classes, count), dtype=np.float32)
-        _sum_strips(self.re, self.im, self.power, re, im, power)
+        _sum_strips(self.re, self.im, self.power, self.place, re, im, power)
         return Sums(re, im, power, self.rows.sum(axis=0))
 
 
@@ -100,13 +111,15 @@ class Sums:
 
 
 @kernel
-def _sum_strips(re: Plane, im: Plane, power: Plane, out_re: Plane, out_im: Plane, out_power: Plane) -> None:
+def _sum_strips(
+    re: Plane, im: Plane, power: Plane, place: Index, out_re: Plane, out_im: Plane, out_power: Plane
+) -> None:
     for s in range(re.shape[0]):
         for c in range(re.shape[1]):
             _add(power[s, c], out_power[c])
-            for p in range(re.shape[2]):
-                _add(re[s, c, p], out_re[c, p])
-                _add(im[s, c, p], out_im[c, p])
+            for p in range(place.shape[0]):
+                _add(re[s, c, place[p]], out_re[c, p])
+                _add(im[s, c, place[p]], out_im[c, p])
 
 
 @kernel
@@ -116,12 +129,12 @@ def _add(line: Plane, total: Plane) -> None:
 
 
 @kernel
-def _weigh(re: Plane, im: Plane, weight: Plane, out_re: Plane, out_im: Plane) -> None:
+def _weigh(re: Plane, im: Plane, weight: Plane, place: Index, out_re: Plane, out_im: Plane) -> None:
     for s in range(re.shape[0]):
         for c in range(re.shape[1]):
-            for p in range(re.shape[2]):
-                _add_weighted(re[s, c, p], weight[c], out_re[s, 0, p])
-                _add_weighted(im[s, c, p], weight[c], out_im[s, 0, p])
+            for p in range(place.shape[0]):
+                _add_weighted(re[s, c, place[p]], weight[c], out_re[s, 0, p])
+                _add_weighted(im[s, c, place[p]], weight[c], out_im[s, 0, p])
 
 
 @kernel

@@ -48,7 +48,7 @@ def follow(
     harmless_px = DRIFT_SHARE * window.bin_height / (len(window.order) - 1)
     drift = UNMOVED
     if harmless_px < FAST_DRIFT_PX:
-        drift = window.drift.measure([window.images[slot] for slot in window.order], start_px)
+        drift = window.drift(start_px)
     belief = window.drift_belief
     if abs(drift.cross_px) < harmless_px:
         belief.note(drift.cross_px)

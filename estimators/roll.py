@@ -19,6 +19,7 @@ from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
+Index = NDArray[np.int64]
 CHI2_OFFSET, CHI2_PER_DOF = 16.0, 3.5
 MAX_STEP_PX = 0.6
 
@@ -41,12 +42,12 @@ def roll_step(fit: Fit, height: Array) -> Array | None:
 def unrolled(products: Products, shift_px: Array) -> Products:
     """The products as if frame k had not been rolled by ``shift_px[k]`` at height 1."""
     re, im = products.re.copy(), products.im.copy()
-    _turn(re, im, products.band.omega(), products.height, shift_px)
-    return replace(products, re=re, im=im)
+    _turn(re, im, products.place, products.band.omega(), products.height, shift_px)
+    return replace(products, re=re, im=im, known=None)
 
 
 @kernel
-def _turn(re: Plane, im: Plane, omega: Array, height: Array, shift: Array) -> None:
+def _turn(re: Plane, im: Plane, place: Index, omega: Array, height: Array, shift: Array) -> None:
     """Multiply products (s, c, p, f) by ``exp(i w y_s (x_i - x_j))``."""
     frames, count = shift.shape[0], omega.shape[0]
     cosine, sine = np.empty((frames, count), dtype=np.float32), np.empty((frames, count), dtype=np.float32)
@@ -58,7 +59,7 @@ def _turn(re: Plane, im: Plane, omega: Array, height: Array, shift: Array) -> No
             for j in range(i + 1, frames):
                 relative_turn(cosine, sine, i, j, c, d)
                 for k in range(re.shape[1]):
-                    _rotate(re[s, k, p], im[s, k, p], c, d)
+                    _rotate(re[s, k, place[p]], im[s, k, place[p]], c, d)
                 p += 1
 
 

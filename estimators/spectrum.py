@@ -159,6 +159,93 @@ def all_pair_products(re: Plane, im: Plane, edges: NDArray[np.int64], out_re: Pl
 
 
 @kernel
+def fresh_products(
+    re: Plane,
+    im: Plane,
+    edges: NDArray[np.int64],
+    slots: NDArray[np.int64],
+    fresh: NDArray[np.bool_],
+    number: NDArray[np.int64],
+    out_re: Plane,
+    out_im: Plane,
+    total_re: Plane,
+    total_im: Plane,
+) -> None:
+    """:func:`pair_products` of the pairs that a fresh frame is in, and their sums over the strips.
+
+    Parameters
+    ----------
+    re, im
+        Spectra by slot, shape (slots, r, f).
+    edges
+        First row of every class of every strip, and the end, shape (s c + 1,).
+    slots
+        Slots in use, oldest first, shape (n,).
+    fresh
+        Which of them have new spectra, shape (n,).
+    number
+        Where the pair of two slots goes, shape (slots, slots).
+    out_re, out_im
+        Products, shape (s c, p, f).
+    total_re, total_im
+        Sums of them, shape (c, p, f).
+    """
+    frames, classes = slots.shape[0], total_re.shape[0]
+    for g in range(edges.shape[0] - 1):
+        c = g % classes
+        for i in range(frames):
+            for j in range(i + 1, frames):
+                if not (fresh[i] or fresh[j]):
+                    continue
+                a, b = slots[i], slots[j]
+                p = number[a, b]
+                out_re[g, p] = np.float32(0.0)
+                out_im[g, p] = np.float32(0.0)
+                _add_products(re[a], im[a], re[b], im[b], edges[g], edges[g + 1], out_re[g, p], out_im[g, p])
+                if g < classes:
+                    total_re[c, p] = np.float32(0.0)
+                    total_im[c, p] = np.float32(0.0)
+                _add_line(out_re[g, p], total_re[c, p])
+                _add_line(out_im[g, p], total_im[c, p])
+
+
+@kernel
+def in_order(lines: Plane, place: NDArray[np.int64], out: Plane) -> None:
+    """Lines (c, q, f) at ``place`` (p,) as ``out`` (c, p, f)."""
+    for c in range(out.shape[0]):
+        for p in range(place.shape[0]):
+            out[c, p] = lines[c, place[p]]
+
+
+@kernel
+def total_power(powers: Plane, slots: NDArray[np.int64], out: Plane, total: Plane) -> None:
+    """Sum powers (slots, s c, f) over slots into ``out`` (s c, f), and these over the strips into ``total`` (c, f)."""
+    total[:] = np.float32(0.0)
+    for g in range(out.shape[0]):
+        out[g] = np.float32(0.0)
+        for k in range(slots.shape[0]):
+            _add_line(powers[slots[k], g], out[g])
+        _add_line(out[g], total[g % total.shape[0]])
+
+
+@kernel
+def _add_line(line: Plane, total: Plane) -> None:
+    for f in range(total.shape[0]):
+        total[f] += line[f]
+
+
+@kernel
+def still_power(re: Plane, slots: NDArray[np.int64], first: int) -> float:
+    """Sum of the products' real parts ``re`` (slots, slots, g, f) from frequency ``first`` on, over all pairs."""
+    total = 0.0
+    for i in range(slots.shape[0]):
+        for j in range(i + 1, slots.shape[0]):
+            for g in range(re.shape[2]):
+                total += float(np.sum(re[slots[i], slots[j], g, first:]))
+    return total
+
+
+@kernel
 def add_power(re: Plane, im: Plane, edges: NDArray[np.int64], out: Plane) -> None:
     """Add the sums of ``|Y|^2`` over the rows of every group to ``out`` (g, f)."""
     for g in range(edges.shape[0] - 1):

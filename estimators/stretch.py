@@ -101,7 +101,7 @@ def stretch_variance(re: Plane, im: Plane, band: Band, offset_px: Array, fit: Fi
     frames = fit.score.shape[1]
     basis = np.ascontiguousarray(motion_basis(frames, len(fit.motion) == 2)[outer_frames(frames)])
     weight, many = fit.weight[:1].astype(np.float32), len(basis)
-    pairs, omega = re.shape[2], band.omega()
+    place, omega = np.arange(re.shape[2]), band.omega()
     level = basis[:, 1:] @ fit.motion[1:]
     found, variance = np.empty(2), 0.0
     score, information = np.empty((1, many)), np.empty((1, many, many))
@@ -110,9 +110,8 @@ def stretch_variance(re: Plane, im: Plane, band: Band, offset_px: Array, fit: Fi
         if not climb(re[half], im[half], weight, omega, basis[:, :1].copy(), offset_px - level, motion, LIMITS):
             return 0.0
         position = basis[:, 0] * motion[0] + level - offset_px
-        position_scores(
-            re[half : half + 1], im[half : half + 1], weight, omega, position, score, information, np.empty((1, pairs))
-        )
+        whole, coherence = slice(half, half + 1), np.empty((1, len(place)))
+        position_scores(re[whole], im[whole], place, weight, omega, position, score, information, coherence)
         found[half] = motion[0]
         variance += WINDOW_VARIANCE / max(float(basis[:, 0] @ information[0] @ basis[:, 0]), 1e-12)
     return SHARE**2 * max(0.0, float(found[1] - found[0]) ** 2 - variance)

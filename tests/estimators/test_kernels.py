@@ -168,7 +168,7 @@ def test_score_and_information_are_derivatives_of_the_brute_force_likelihood() -
     score, information = np.empty((1, FRAMES)), np.empty((1, FRAMES, FRAMES))
     coherence = np.empty((1, pair_count(FRAMES)))
     one = np.ones((1, band.count), dtype=np.float32)
-    position_scores(p_re[None], p_im[None], one, omega, x, score, information, coherence)
+    position_scores(p_re[None], p_im[None], np.arange(len(p_re[0])), one, omega, x, score, information, coherence)
 
     def value(at: np.ndarray) -> float:
         return _likelihood(re, im, omega, weight, at)
@@ -232,6 +232,7 @@ def test_products_without_roll_are_those_of_spectra_without_it() -> None:
     products = Products(
         seen.real.astype(np.float32)[:, None], seen.imag.astype(np.float32)[:, None],
         np.zeros((3, 1, band.count), dtype=np.float32), np.zeros(FRAMES), band, 128, np.ones((3, 1)), height,
+        np.arange(len(i)),
     )  # fmt: skip
     found = unrolled(products, shift)
     np.testing.assert_allclose(found.re[:, 0] + 1j * found.im[:, 0], level, atol=1e-4)
