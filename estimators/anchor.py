@@ -90,7 +90,7 @@ class Anchor:
         lowest = min(places)
         common = self._width - (max(places) - lowest)
         ahead = edge = 0
-        if streaming:
+        if streaming and self._width >= WIDE_PX:
             many = min(int(SPARE_SHARE * common / max(abs(displacement_px), TINY_PX)), SPARE_FRAMES)
             ahead, edge = math.ceil(many * abs(displacement_px)), EDGE_PX if many else 0
         self.length = common - ahead - 2 * edge

@@ -14,6 +14,7 @@ from axialnav.estimators.drift import Drift, DriftBelief, DriftMeter
 from axialnav.estimators.frames import Image
 from axialnav.estimators.layout import BANDS, RowLayout, binned_coefficients, remove_level
 from axialnav.estimators.occlusion import OccluderFinder
+from axialnav.estimators.positions import centred_times
 from axialnav.estimators.products import Products
 from axialnav.estimators.rows import bin_height, row_sums
 from axialnav.estimators.spectrum import LAST_FREQUENCY, Band
@@ -96,18 +97,19 @@ class FrameWindow:
     def following(self, displacement_px: float, drift_px: float = 0.0, reach: float = LAST_FREQUENCY) -> Products:
         """Products of windows that follow a wall moving by so much per frame along and across the rows.
 
-        ``reach`` is the highest frequency that is wanted [cycles/px].
+        They are in the window's memory, and good until the next call.  ``reach`` is the highest frequency that is
+        wanted [cycles/px].
         """
         order, anchor = self.order, self._anchor
         anchor.aim(order, displacement_px)
-        times = np.arange(len(order)) - 0.5 * (len(order) - 1)
-        down = np.rint(drift_px * times).astype(np.int64)
+        times = centred_times(len(order))
+        along, down = (np.rint(step_px * times).astype(np.int64) for step_px in (displacement_px, drift_px))
         start, offset = np.array([anchor.start[slot] for slot in order]), anchor.offsets(order)
         if down.any():
             planes, slots, serial = self._moved_down(down), np.arange(len(order)), np.zeros(0, dtype=np.int64)
         else:
             planes, slots, serial = self._rows, np.array(order), np.array([anchor.serial[slot] for slot in order])
-        hidden = self._occluders.hidden(planes, slots, offset)
+        hidden = self._occluders.hidden(planes, slots, along)
         self._cut = Cut(planes, slots, start, offset, anchor.length, hidden, serial)
         return self._cuts.products(self._cut, reach)
 
