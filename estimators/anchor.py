@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Index = NDArray[np.int64]
-SPARE_SHARE, SPARE_FRAMES = (
-    0.03,
-    64,
-)  # of what all frames share, given away ahead of the motion; frames it need not last longer
+SPARE_SHARE = 0.03  # of what all frames share: given away ahead of the motion
+SPARE_FRAMES = 64  # a section need not last longer
+WIDE_PX = 640  # smaller pictures have no columns to spare, and take no time
 EDGE_PX = 2  # on both sides: whole pixels, and motion that is not quite even
 TINY_PX = 1e-9
 OFF_PX = 1.5  # from where the motion has the section: more is not the motion that frames were cut for
