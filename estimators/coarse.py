@@ -35,11 +35,10 @@ class CoarseSearch:
         self._start = (width - self.band.length) // 2
         self._hann = hann(self.band.length)
         rows, groups, count = len(layout.coarse_rows), layout.coarse_count.size, self.band.count
-        self._windowed = np.zeros((rows, self.band.length), dtype=np.float32)
-        self._packed = np.zeros_like(self._windowed)
-        self._re, self._im = np.zeros((2, frames, rows, count), dtype=np.float32)
-        self._power = np.zeros((frames, groups, count), dtype=np.float32)
-        self._pair_re, self._pair_im = np.zeros((2, frames, frames, groups, count), dtype=np.float32)
+        self._windowed, self._packed = np.empty((2, rows, self.band.length), dtype=np.float32)
+        self._re, self._im = np.empty((2, frames, rows, count), dtype=np.float32)
+        self._power = np.empty((frames, groups, count), dtype=np.float32)
+        self._pair_re, self._pair_im = np.empty((2, frames, frames, groups, count), dtype=np.float32)
         self._lags = LagTransform(BANDS, self.band)
 
     def push(self, rows: Plane, slot: int, older: list[int]) -> None:

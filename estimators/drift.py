@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,17 @@ Plane = NDArray[np.float32]
 COLUMNS = 32
 REACH_PX = 24.0
 MANY_FRAMES = 5
+DRIFT_SHARE = 1.0  # of a bin: drift over the whole window that is worth following
+FAST_DRIFT_PX = 12.0  # per frame: faster than anything that flies beside a wall; bins that hide it need no look
 KEPT_WINDOWS = 30
 TALL_PX = 400  # taller pictures are read every second (third, ...) row: that is sharp enough
 MIN_SIGNIFICANCE = 6.0
 SIGMA_PX = 0.08  # of what is read between two of the asked frames, measured on rendered walls; a pixel pattern is in it
+
+
+def hidden_drift_px(bin_height: int, frames: int) -> float:
+    """Drift [px per frame] of so many frames that bins of so many rows hide, so that it is not worth following."""
+    return DRIFT_SHARE * bin_height / (frames - 1)
 
 
 @dataclass(frozen=True)
@@ -89,8 +95,8 @@ class DriftMeter:
         reach = round(REACH_PX / STEP_PX)
         self._grid = np.asarray(STEP_PX * np.arange(-reach, reach + 1), dtype=np.float64)
 
-    def measure(self, images: NDArray[np.unsignedinteger[Any]], order: list[int], anchor: Anchor) -> Drift:
-        """Drift of the frames in the slots ``order``, oldest first, of ``images`` (slots, h, w).
+    def measure(self, images: list[Image], order: list[int], anchor: Anchor) -> Drift:
+        """Drift of the frames in the slots ``order``, oldest first, of ``images`` by slot.
 
         The columns follow the wall with the section that is anchored to it, or there would be nothing in common between
         them.  Of many frames the first, the middle and the last are asked.

@@ -109,11 +109,9 @@ def stranger(fit: Fit, rows: Array, omega: Array) -> bool:
     frames = fit.score.shape[1]
     if frames < 3:
         return False
-    pairs = pair_frames(frames)
-    near = pairs[:, 1] - pairs[:, 0] == 1
-    i, j = pairs[near].T
-    shared = fit.coherence.sum(axis=0)[near], -0.5 * fit.information.sum(axis=0)[i, j]
-    missing = [_missing(part) for part in shared]
+    coarse, information = fit.coherence.sum(axis=0).tolist(), fit.information.sum(axis=0).tolist()
+    pairs = [(p, i) for p, (i, j) in enumerate(pair_frames(frames).tolist()) if j == i + 1]
+    missing = _missing([coarse[p] for p, _ in pairs]), _missing([-0.5 * information[i][i + 1] for _, i in pairs])
     if not any(missing):
         return False
     total = fit.texture + fit.noise
@@ -122,7 +120,7 @@ def stranger(fit: Fit, rows: Array, omega: Array) -> bool:
     return any(lack > SURE_PAIR * float(own) for lack, own in zip(missing, sigma, strict=True))
 
 
-def _missing(shared: Array) -> float:
+def _missing(shared: list[float]) -> float:
     """How much less than usual the least is of what neighbouring frames share (n - 1,); 0 unless far less."""
-    usual, least = middle(shared), float(shared.min())
+    usual, least = middle(shared), min(shared)
     return usual - least if least < MIN_PAIR_SHARE * usual else 0.0

@@ -101,7 +101,7 @@ def unusable(image: Image) -> str:
     return ""
 
 
-def same_picture(first: Image, second: Image) -> bool:
+def same_picture(first: NDArray[Any], second: NDArray[Any]) -> bool:
     """Whether two pictures of one size are equal pixel by pixel; noise in the middle row usually tells at once."""
     row = first.shape[0] // 2
     return np.array_equal(first[row], second[row]) and np.array_equal(first, second)

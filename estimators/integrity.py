@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
-from axialnav.estimators.positions import motion_basis
+from axialnav.estimators.positions import centred_times
 from axialnav.estimators.products import Products
 from axialnav.estimators.search import SOFTENING, Profiles
+from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 REACH_PX = 0.75
 OPPOSED = 8.0  # softened log-likelihood by which a band must prefer another displacement to count as opposed
@@ -59,18 +61,18 @@ def choose(profiles: Profiles, every_band: bool = True) -> Choice:
     if not every_band:
         everyone = np.ones(bands, dtype=np.bool_)
         return Choice(likeliest, everyone, ~everyone)
-    best = gain.max(axis=1)
-    sure = best > SURE * profiles.spread
+    floor = SURE * profiles.spread
 
     def against(candidate: int) -> Mask:
         """Bands that oppose a grid point."""
-        return np.asarray(sure & (best - profiles.highest(candidate, REACH_PX) > OPPOSED * SOFTENING))
+        best, near = profiles.highest(candidate, REACH_PX)
+        return np.asarray((best > floor) & (best - near > OPPOSED * SOFTENING))
 
     opposed = against(likeliest)
     if not opposed.any():
         return Choice(likeliest, ~opposed, opposed)  # no other can have fewer opponents or be more likely
     choices = []
-    for candidate in sorted({likeliest, *gain[sure].argmax(axis=1).tolist()}):
+    for candidate in sorted({likeliest, *gain[gain.max(axis=1) > floor].argmax(axis=1).tolist()}):
         near, opposed = profiles.near(candidate, REACH_PX), against(candidate)
         place = near.start + int(np.argmax(gain[~opposed, near].sum(axis=0))) if not opposed.all() else candidate
         likelihood = float(gain[~opposed, place].sum())
@@ -85,20 +87,56 @@ def quarrelling(fit: Fit, products: Products) -> Mask:
     Far is measured by their own information and by how much strips differ in general, so that a picture that is a
     little uneven everywhere loses none.
     """
-    basis = motion_basis(fit.score.shape[1], len(fit.motion) == 2)[:, 0]
-    own = (fit.information @ basis) @ basis
-    positive = np.maximum(own, TINY)
-    step = (fit.score @ basis) / positive
-    apart = np.abs(step - middle(step))
-    deviation = apart * np.sqrt(positive / WINDOW_VARIANCE)
-    usual = min(max(middle(deviation) / MEDIAN_OF_NORMAL, 1.0), MAX_USUAL)
+    bad = np.empty(len(fit.score), dtype=np.bool_)
     tolerated = min(TOLERATED_PX, TOLERATED_SHARE * abs(float(fit.motion[0])) + TOLERATED_LEAST_PX)
-    return np.asarray(((deviation > FAR * usual) & (apart > tolerated)) | (own <= 0.0))
+    _quarrelling(fit.score, fit.information, centred_times(fit.score.shape[1]), tolerated, bad)
+    return bad
 
 
-def middle(values: Array) -> float:
-    """Median of a few numbers (n,), without the overhead of numpy's."""
-    ordered: list[float] = sorted(values.tolist())
+@kernel
+def _quarrelling(score: Array, information: Array, times: Array, tolerated: float, bad: Mask) -> None:
+    """See :func:`quarrelling`; scores (s, n) and information (s, n, n), times (n,) of the frames [periods]."""
+    strips = score.shape[0]
+    own, step, deviation = np.zeros(strips), np.zeros(strips), np.empty(strips)
+    for s in range(strips):
+        for i in range(score.shape[1]):
+            step[s] += times[i] * score[s, i]
+            for j in range(score.shape[1]):
+                own[s] += times[i] * information[s, i, j] * times[j]
+        step[s] /= max(own[s], TINY)
+    usual_step = _median(step)
+    for s in range(strips):
+        deviation[s] = abs(step[s] - usual_step) * np.sqrt(max(own[s], TINY) / WINDOW_VARIANCE)
+    usual = min(max(_median(deviation) / MEDIAN_OF_NORMAL, 1.0), MAX_USUAL)
+    for s in range(strips):
+        far = deviation[s] > FAR * usual and abs(step[s] - usual_step) > tolerated
+        bad[s] = far or own[s] <= 0.0
+
+
+@kernel
+def _median(values: Array) -> float:
+    """Median of a few numbers (n,)."""
+    count = values.shape[0]
+    ordered = _sorted(values)
+    return float(0.5 * (ordered[(count - 1) // 2] + ordered[count // 2]))
+
+
+@kernel
+def _sorted(values: Array) -> Array:
+    """A few numbers (n,), the smallest first."""
+    ordered = values.copy()
+    for k in range(1, ordered.shape[0]):
+        at, value = k, ordered[k]
+        while at > 0 and ordered[at - 1] > value:
+            ordered[at] = ordered[at - 1]
+            at -= 1
+        ordered[at] = value
+    return ordered
+
+
+def middle(values: list[float]) -> float:
+    """Median of a few numbers, without the overhead of numpy's."""
+    ordered = sorted(values)
     return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
 
 
@@ -108,17 +146,27 @@ def disturbed(fit: Fit, products: Products) -> Mask:
     Something fixed to the camera leaves the windows that follow the wall, and is noise to them; in a strip of its own
     it costs less left out than carried along.
     """
-    strips, frames = len(products.power), products.frames
-    whole = products.power.reshape(strips, -1) @ fit.weight.ravel()
-    shared = 2.0 * fit.coherence.sum(axis=1)
-    unit = (frames - 1) * products.rows.sum(axis=1)
-    alien = (whole - (whole + shared) / frames) / unit
-    usual = middle(np.sort(alien)[: (strips + 1) // 2 + 1])
-    bad = np.asarray(alien > MAX_ALIEN * usual)
-    if bad.any():
-        bad &= alien - usual > MAX_ALIEN_SHARE * shared / (frames * unit)
-        bad[np.argsort(alien)[: strips - MAX_LOST_STRIPS]] = False
+    bad = np.empty(len(products.power), dtype=np.bool_)
+    whole = products.power.reshape(len(bad), -1) @ fit.weight.ravel()
+    _disturbed(whole, fit.coherence, products.rows, products.frames, bad)
     return bad
+
+
+@kernel
+def _disturbed(whole: Plane, coherence: Array, rows: Array, frames: int, bad: Mask) -> None:
+    """See :func:`disturbed`; weighted power (s,) and coherence (s, p) of ``rows`` (s, c) rows."""
+    strips = whole.shape[0]
+    alien, texture = np.empty(strips), np.empty(strips)
+    for s in range(strips):
+        shared, unit = 2.0 * np.sum(coherence[s]), (frames - 1) * np.sum(rows[s])
+        alien[s] = (whole[s] - (whole[s] + shared) / frames) / unit
+        texture[s] = shared / (frames * unit)
+    ordered = _sorted(alien)
+    usual = _median(ordered[: (strips + 1) // 2 + 1])
+    least = ordered[max(strips - MAX_LOST_STRIPS, 0)]
+    for s in range(strips):
+        more = alien[s] - usual
+        bad[s] = alien[s] >= least and alien[s] > MAX_ALIEN * usual and more > MAX_ALIEN_SHARE * texture[s]
 
 
 def white(fit: Fit, rows: Array) -> bool:

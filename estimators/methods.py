@@ -54,7 +54,8 @@ def estimate_stack(
         return fit_single([stack[len(stack) // 2]], frame_period_s, exposure_s)
     if method in BASELINES:
         return _baseline(stack, method, frame_period_s, exposure_s)
-    window = FrameWindow(stack[0].shape[0], stack[0].shape[1], len(stack), stack[0].dtype)
+    height, width = stack[0].shape
+    window = FrameWindow(height, width, len(stack), stack[0].dtype, borrow=True)
     for image in stack:
         window.push(image)
     return measure_joint(window, JointOptions(frame_period_s, exposure_s, prior_px))

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.drift import Drift
+from axialnav.estimators.drift import FAST_DRIFT_PX, Drift, hidden_drift_px
 from axialnav.estimators.evenness import SURE_BEND, bend_significance, residual, short_bend
 from axialnav.estimators.integrity import MAX_LOST_STRIPS, disturbed, quarrelling
 from axialnav.estimators.joint import Fit, best_bend, fit_motion, refit_motion
@@ -20,8 +20,6 @@ from axialnav.estimators.window import FrameWindow
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 MAX_ROLL_STEPS = 4
-DRIFT_SHARE = 1.0  # of a bin: drift over the whole window that is worth following
-FAST_DRIFT_PX = 12.0  # per frame: faster than anything that flies beside a wall; bins that hide it need no look
 CLEARLY = 1.5  # ratio of two variances that ten strips hardly show by chance
 JUMP_BINS = 2.0  # a drift that changes by more from window to window is asked again
 SLOW_PX = 2.0  # per frame: below, what repeats is weighed anew without the pattern
@@ -45,7 +43,7 @@ def follow(
         products = window.following(start_px, drift_px, reach)
         return products.selected(strips | window.cleared)
 
-    harmless_px = DRIFT_SHARE * window.bin_height / (len(window.order) - 1)
+    harmless_px = hidden_drift_px(window.bin_height, len(window.order))
     drift = UNMOVED
     if harmless_px < FAST_DRIFT_PX:
         drift = window.drift(start_px)

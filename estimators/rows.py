@@ -117,8 +117,9 @@ def tukey(length: int, share: float = 0.1) -> Plane:
     return window
 
 
+@lru_cache(maxsize=64)
 def hann(length: int) -> Plane:
-    """Hann window (length,)."""
+    """Hann window (length,), shared: not to be written to."""
     return np.hanning(length).astype(np.float32)
 
 

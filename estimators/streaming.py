@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.errors import FrameError
-from axialnav.estimators.frames import Image, luma, same_picture, unusable
+from axialnav.estimators.frames import Image, luma, unusable
 from axialnav.estimators.lens import CentralView
 from axialnav.estimators.measure import JointOptions, measure_joint
 from axialnav.estimators.methods import LEAST_FRAMES, estimate_stack, known_method
@@ -158,11 +158,9 @@ class MotionEstimator:
             if self._window is None:
                 self._window = FrameWindow(grey.shape[0], grey.shape[1], self._frames, grey.dtype)
             window = self._window
-            self._check_size(grey, window.images[0])
-            repeated = bool(window.order) and same_picture(window.images[window.order[-1]], grey)
+            self._check_size(grey, window)
             window.push(grey)  # before the look at its pixels, which are then near the processor
-            kept = window.images[window.order[-1]]
-            self._reasons.append(unusable(kept) or (MotionReason.DUPLICATED if repeated else ""))
+            self._reasons.append(unusable(grey) or (MotionReason.DUPLICATED if window.repeated else ""))
         else:
             if self._stack:
                 self._check_size(grey, self._stack[-1])
@@ -170,7 +168,7 @@ class MotionEstimator:
         self._stamps.append(int(t_ns))
 
     @staticmethod
-    def _check_size(grey: Image, before: Image) -> None:
+    def _check_size(grey: Image, before: Image | FrameWindow) -> None:
         if grey.shape != before.shape or grey.dtype != before.dtype:
             raise FrameError(
                 f"the frame is {grey.shape} {grey.dtype}, those before are {before.shape} {before.dtype}; "

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from axialnav.estimators.anchor import Anchor
 from axialnav.estimators.coarse import CoarseSearch
 from axialnav.estimators.cuts import Cut, WallCuts
-from axialnav.estimators.drift import Drift, DriftBelief, DriftMeter
-from axialnav.estimators.frames import Image
-from axialnav.estimators.layout import BANDS, RowLayout, binned_coefficients, remove_level
+from axialnav.estimators.drift import FAST_DRIFT_PX, Drift, DriftBelief, DriftMeter, hidden_drift_px
+from axialnav.estimators.frames import Image, same_picture
+from axialnav.estimators.layout import BANDS, binned_coefficients, remove_level, row_layout
 from axialnav.estimators.occlusion import OccluderFinder
 from axialnav.estimators.positions import centred_times
 from axialnav.estimators.products import Products
@@ -35,15 +35,21 @@ class FrameWindow:
         Length of the ring.
     dtype
         Type of the pixels.
+    borrow
+        Whether the frames stay as they are for as long as this window is in use, and need not be copied.
     """
 
-    def __init__(self, height: int, width: int, frames: int, dtype: np.dtype[np.unsignedinteger[Any]]) -> None:
+    def __init__(
+        self, height: int, width: int, frames: int, dtype: np.dtype[np.unsignedinteger[Any]], borrow: bool = False
+    ) -> None:
+        self.shape, self.dtype = (height, width), dtype
         self.bin_height = bin_height(height, width)
         self.size = frames
-        self.layout = RowLayout(height // self.bin_height)
+        self.layout = row_layout(height // self.bin_height)
         rows = self.layout.used
-        self.images = np.zeros((frames, height, width), dtype=dtype)
-        self._rows = np.zeros((frames, rows, width), dtype=np.float32)
+        self._borrow, self._keep = borrow, hidden_drift_px(self.bin_height, frames) < FAST_DRIFT_PX
+        self._images: list[Image] = [np.empty(self.shape, dtype=dtype) for _ in range(frames if self._keep else 1)]
+        self._rows = np.empty((frames, rows, width), dtype=np.float32)
         self._shifted = np.zeros((0, rows, width), dtype=np.float32)
         self._sums = row_sums(width, self.bin_height, dtype)
         self._work = np.zeros((1 << self.layout.levels, width), dtype=np.float32)
@@ -74,10 +80,21 @@ class FrameWindow:
     def push(self, image: Image) -> None:
         """Take in one grey frame (h, w); the oldest leaves when the ring is full."""
         slot = self._free_slot()
-        self.images[slot] = image
-        self._transform(slot, 0, self._rows[slot])
+        self._enter(image, slot)
         self.coarse.push(self._rows[slot], slot, self.order)
         self.order.append(slot)
+
+    def _enter(self, image: Image, slot: int) -> None:
+        """Bin a frame, and keep it if it may be looked at again."""
+        own = slot if self._keep else 0
+        plain = image.flags.c_contiguous and image.flags.writeable  # kernels would be compiled anew for others
+        if self._borrow:
+            self._images[own] = image if plain else image.copy()
+        elif not plain:
+            np.copyto(self._images[own], image)
+        picture = image if plain else self._images[own]
+        kept = self._images[own] if plain and self._keep and not self._borrow else picture[:0]
+        self._transform(picture, 0, kept, self._rows[slot])
 
     def _free_slot(self) -> int:
         """A slot without a frame: that of the oldest, which leaves, if there is no other."""
@@ -87,10 +104,17 @@ class FrameWindow:
         self._anchor.release(slot)
         return slot
 
-    def _transform(self, slot: int, first_row: int, out: Plane) -> None:
+    @property
+    def repeated(self) -> bool:
+        """Whether the last two frames are equal in all their binned rows."""
+        if len(self.order) < 2:
+            return False
+        return same_picture(*(self._rows[slot] for slot in self.order[-2:]))
+
+    def _transform(self, image: Image, first_row: int, kept: Image, out: Plane) -> None:
         layout = self.layout
         binned_coefficients(
-            self.images[slot], first_row, self.bin_height, layout.levels, layout.place, self._sums, self._work, out
+            image, first_row, self.bin_height, layout.levels, layout.place, self._sums, self._work, kept, out
         )
         remove_level(out, layout.smooth, self._means)
 
@@ -116,7 +140,7 @@ class FrameWindow:
     def drift(self, displacement_px: float) -> Drift:
         """Motion across the rows of a wall that moves by so much per frame along them."""
         self._anchor.aim(self.order, displacement_px)
-        return self._drift.measure(self.images, self.order, self._anchor)
+        return self._drift.measure(self._images, self.order, self._anchor)
 
     @property
     def cleared(self) -> NDArray[np.bool_]:
@@ -138,7 +162,7 @@ class FrameWindow:
             self._shifted = np.zeros_like(self._rows)
         for k, slot in enumerate(self.order):
             if down[k]:
-                self._transform(slot, int(down[k]), self._shifted[k])
+                self._transform(self._images[slot], int(down[k]), self._images[slot][:0], self._shifted[k])
             else:
                 self._shifted[k] = self._rows[slot]
         return self._shifted

@@ -35,7 +35,9 @@ FRAMES = 4
 def _coefficients(frame: np.ndarray, layout: RowLayout, height: int, first_row: int = 0) -> np.ndarray:
     out = np.full((layout.used, frame.shape[1]), np.nan, dtype=np.float32)
     sums, work = row_sums(frame.shape[1], height, frame.dtype), np.zeros((1 << layout.levels, frame.shape[1]))
-    binned_coefficients(frame, first_row, height, layout.levels, layout.place, sums, work.astype(np.float32), out)
+    kept = np.empty_like(frame) if first_row == 0 else frame[:0]
+    binned_coefficients(frame, first_row, height, layout.levels, layout.place, sums, work.astype(np.float32), kept, out)
+    np.testing.assert_array_equal(kept, frame[: len(kept)])
     return out
 
 

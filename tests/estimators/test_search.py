@@ -104,6 +104,5 @@ def test_the_weights_of_a_search_are_those_of_the_spectra_that_made_it() -> None
 def test_the_border_of_a_coarse_grid_is_interpolated() -> None:
     gain = np.array([[0.0, 1.0, 5.0, 9.0, 2.0]], dtype=np.float32)
     found = Profiles(0.5 * np.arange(5), gain, np.ones(1))
-    assert found.highest(1, 0.75)[0] == 7.0
-    assert found.highest(1, 1.0)[0] == 9.0
-    assert found.highest(0, 0.75)[0] == 3.0
+    for index, reach_px, near in ((1, 0.75, 7.0), (1, 1.0, 9.0), (0, 0.75, 3.0), (4, 0.75, 9.0)):
+        assert [float(top[0]) for top in found.highest(index, reach_px)] == [9.0, near]
