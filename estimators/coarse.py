@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -61,10 +62,8 @@ class CoarseSearch:
         """
         slots, rows = np.array(order, dtype=np.int64), self._layout.coarse_count.ravel()
         first = int(FINE_FROM * self.band.count)
-        shared = still_power(self._pair_re, slots, first)
-        noise = self._power[slots, :, first:].mean(axis=(0, 2), dtype=np.float64)
-        looks = 0.5 * HANN_VARIANCE * pair_count(len(order)) * (self.band.count - first)
-        return shared > SURE * float(np.sqrt(looks * np.sum(noise**2 / rows)))
+        shared, noise = still_power(self._pair_re, self._power, slots, rows, first)
+        return shared > SURE * math.sqrt(0.5 * HANN_VARIANCE * pair_count(len(order)) * noise)
 
     def profiles(self, order: list[int], grid_px: Array) -> Profiles:
         """Likelihood of every displacement [px] for the frames in the slots ``order``, oldest first."""

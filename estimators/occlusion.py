@@ -52,17 +52,20 @@ def _cell_powers(
     wanted
         Strips to look at, shape (s,).
     sums
-        Scratch, shape (4, w).
+        Scratch, shape (5, w).
     out
         Result, shape (2, s, b).
     """
     width = planes.shape[2]
-    total, column, seen, level = sums[0], sums[1], sums[2], sums[3, : out.shape[2]]
+    cells = out.shape[2]
+    total, column, seen, level, looks = sums[0], sums[1], sums[2], sums[3, :cells], sums[4, :cells]
     seen[:] = np.float32(0.0)
     for k in range(order.shape[0]):
         seen[max(0, -shift[k]) : min(width, width - shift[k])] += np.float32(1.0)
-    for c in range(width):
-        seen[c] = np.float32(1.0) / max(seen[c], np.float32(1.0))
+    np.maximum(seen, np.float32(1.0), seen)
+    for b in range(cells):
+        looks[b] = _sum_cell(seen[b * CELL_PX : (b + 1) * CELL_PX])
+    seen[:] = np.float32(1.0) / seen
     for s in range(spans.shape[0]):
         if not wanted[s]:
             continue
@@ -83,13 +86,10 @@ def _cell_powers(
             _add_square(total, column)
             _add_level(total, level)
         _multiply(seen, column)
-        for b in range(out.shape[2]):
-            power, looks = np.float32(0.0), np.float32(0.0)
-            for c in range(b * CELL_PX, (b + 1) * CELL_PX):
-                power += column[c]
-                looks += np.float32(1.0) / seen[c]
+        for b in range(cells):
+            power = _sum_cell(column[b * CELL_PX : (b + 1) * CELL_PX])
             out[0, s, b] = power
-            out[1, s, b] = power - level[b] / looks
+            out[1, s, b] = power - level[b] / looks[b]
 
 
 @kernel
@@ -120,10 +120,16 @@ def _add_square(line: Plane, total: Plane) -> None:
 def _add_level(line: Plane, level: Plane) -> None:
     """Add the square of the sum over every 16 columns of ``line`` (w,) to ``level`` (w // 16,)."""
     for b in range(level.shape[0]):
-        t = line[b * CELL_PX : (b + 1) * CELL_PX]
-        left = (t[0] + t[1]) + (t[2] + t[3]) + ((t[4] + t[5]) + (t[6] + t[7]))
-        right = (t[8] + t[9]) + (t[10] + t[11]) + ((t[12] + t[13]) + (t[14] + t[15]))
-        level[b] += (left + right) * (left + right)
+        total = _sum_cell(line[b * CELL_PX : (b + 1) * CELL_PX])
+        level[b] += total * total
+
+
+@kernel
+def _sum_cell(t: Plane) -> np.float32:
+    """Sum of ``t`` (16,), halves upon halves: a few vector instructions."""
+    left = ((t[0] + t[8]) + (t[4] + t[12])) + ((t[2] + t[10]) + (t[6] + t[14]))
+    right = ((t[1] + t[9]) + (t[5] + t[13])) + ((t[3] + t[11]) + (t[7] + t[15]))
+    return np.float32(left + right)
 
 
 class OccluderFinder:
@@ -139,7 +145,7 @@ class OccluderFinder:
 
     def __init__(self, width: int, spans: Index) -> None:
         self._spans, self._all = spans, np.ones(len(spans), dtype=np.bool_)
-        self._sums = np.zeros((4, width), dtype=np.float32)
+        self._sums = np.zeros((5, width), dtype=np.float32)
         self._cells = np.zeros((3, 2, len(spans), width // CELL_PX))
         self._samples = np.diff(spans, axis=1) * float(CELL_PX)
 
@@ -153,7 +159,7 @@ class OccluderFinder:
             return np.zeros(still.shape[1:], dtype=np.bool_)
         self._powers(planes, order[:1], 0 * order[:1], self._all, one)
         self._powers(planes, order, 0 * order, self._all, still)
-        usual = float(np.median(one[1] / self._samples)) * self._samples
+        usual = _middle(one[1] / self._samples) * self._samples
         noise = usual * np.sqrt(2.0 / self._samples)
         repeats: Mask = np.asarray(still[1] - usual > SURE * noise)
         doubtful: Mask = np.any(repeats, axis=1)
@@ -172,6 +178,11 @@ class OccluderFinder:
 
     def _powers(self, planes: Plane, order: Index, shift: Index, wanted: Mask, out: Array) -> None:
         _cell_powers(planes, order, shift, self._spans, wanted, self._sums, out)
+
+
+def _middle(values: Array) -> float:
+    """The number in the middle of the sorted ``values``, without the overhead of numpy's median."""
+    return float(np.partition(values, values.size // 2, axis=None)[values.size // 2])
 
 
 def connected(cells: Mask, seeds: Mask) -> Mask:

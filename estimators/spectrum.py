@@ -235,14 +235,47 @@ def _add_line(line: Plane, total: Plane) -> None:
 
 
 @kernel
-def still_power(re: Plane, slots: NDArray[np.int64], first: int) -> float:
-    """Sum of the products' real parts ``re`` (slots, slots, g, f) from frequency ``first`` on, over all pairs."""
-    total = 0.0
+def still_power(re: Plane, power: Plane, slots: NDArray[np.int64], rows: Array, first: int) -> tuple[float, float]:
+    """What frames share without moving from frequency ``first`` on, and its variance if they share nothing.
+
+    Parameters
+    ----------
+    re
+        Real parts of pair products, shape (slots, slots, g, f).
+    power
+        Sums of squares, shape (slots, g, f).
+    slots
+        Slots in use, oldest first.
+    rows
+        Rows behind every group, shape (g,).
+    first
+        First frequency.
+
+    Returns
+    -------
+    shared
+        Sum over all pairs, groups and frequencies.
+    variance
+        Of the product of one pair with unrelated phases, summed over groups and frequencies, twice.
+    """
+    fine = re.shape[3] - first
+    total, square, shared, variance = np.zeros(fine, dtype=np.float32), np.empty(fine, dtype=np.float32), 0.0, 0.0
     for i in range(slots.shape[0]):
         for j in range(i + 1, slots.shape[0]):
             for g in range(re.shape[2]):
-                total += float(np.sum(re[slots[i], slots[j], g, first:]))
-    return total
+                _add_line(re[slots[i], slots[j], g, first:], total)
+    for g in range(re.shape[2]):
+        square[:] = np.float32(0.0)
+        for i in range(slots.shape[0]):
+            _add_line(power[slots[i], g, first:], square)
+        mean = 0.0
+        for f in range(fine):
+            mean += square[f]
+        mean /= fine * slots.shape[0]
+        variance += fine * mean * mean / rows[g]
+    for f in range(fine):
+        shared += total[f]
+    return shared, variance
 
 
 @kernel
