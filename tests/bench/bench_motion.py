@@ -31,6 +31,7 @@ from tests.bench.motion_scenes import (
     Condition,
     draw,
 )
+from tests.bench.motion_streams import streams
 from tests.bench.motion_trials import Trials, run_trials
 
 Way = Callable[[NDArray[np.uint8]], float]
@@ -48,6 +49,7 @@ def main(arguments: Sequence[str]) -> int:
     parts: dict[str, Callable[[], str]] = {
         "accuracy": lambda: accuracy(count),
         "integrity": lambda: integrity(max(1, count // 2)),
+        "streams": lambda: streams(max(1, count // 8)),
         "blur": lambda: blur_methods(max(1, count // 4)),
         "peers": lambda: peers(PEER_TRIALS),
         "speed": speed,
