@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axialnav.estimators.joint import Fit
+from axialnav.estimators.positions import turns
 from axialnav.estimators.spectrum import Band
 from axialnav.estimators.whittle import parabola, whittle_costs
+from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
 MIN_LENGTH_PX = 2.0
@@ -91,12 +93,28 @@ def blur_ratio(fit: Fit, band: Band, rows: Array, exposure_ratio: float) -> Kapp
         used = values[..., first : first + count * size]
         return np.ascontiguousarray(used.reshape(*values.shape[:-1], count, size).mean(axis=-1))
 
-    tables = grouped(np.sinc(RATIOS[:, None] * expected_px * band.frequency()) ** 2)
-    cost = np.empty(len(RATIOS))
+    tables, cost = np.empty((len(RATIOS), count)), np.empty(len(RATIOS))
+    blur_transfers(RATIOS * expected_px, band.omega()[first:], size, tables)
     number = np.empty(len(RATIOS), dtype=np.int64)
     whittle_costs(np.maximum(grouped(power), TINY), tables, grouped(blur_shapes(band)[::SHAPE_STRIDE]), cost, number)
     looks = 1.0 / (1.0 / (float(rows.sum()) * size) + MISMATCH**2)
     return _read(cost * looks)
+
+
+@kernel
+def blur_transfers(length_px: Array, omega: Array, size: int, out: Array) -> None:
+    """Power transfer of blurs (m,) [px], means over ``size`` neighbouring frequencies (f,) [rad/px], shape (m, g)."""
+    cosine, sine = np.empty((1, omega.shape[0]), dtype=np.float32), np.empty((1, omega.shape[0]), dtype=np.float32)
+    half = np.empty(1)
+    for m in range(out.shape[0]):
+        half[0] = 0.5 * length_px[m]
+        turns(omega, half, cosine, sine)
+        for g in range(out.shape[1]):
+            total = 0.0
+            for f in range(g * size, (g + 1) * size):
+                ratio = sine[0, f] / (half[0] * omega[f])
+                total += ratio * ratio
+            out[m, g] = total / size
 
 
 def _read(cost: Array) -> Kappa:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from axialnav.estimators.extra import extra_step
+from axialnav.estimators.kappa import blur_transfers
 from axialnav.estimators.layout import BANDS, STRIPS, RowLayout, binned_coefficients, remove_level
 from axialnav.estimators.occlusion import OccluderFinder
 from axialnav.estimators.positions import (
@@ -349,3 +350,12 @@ def test_an_object_goes_on_where_its_edge_runs_along_the_motion() -> None:
     finder = OccluderFinder(256, np.stack([np.arange(0, 40, 4), np.arange(4, 41, 4)], axis=1))
     hidden = finder.hidden(planes.astype(np.float32), np.arange(4), -3 * np.arange(4))
     assert np.argwhere(hidden).tolist() == [[2, b] for b in range(3, 11)]
+
+
+def test_transfers_of_blurs_are_squared_sincs() -> None:
+    omega, length_px = Band(640).omega()[7:], np.array([2.5, 9.0, 31.0])
+    found = np.empty((3, len(omega) // 4))
+    blur_transfers(length_px, omega, 4, found)
+    exact = np.sinc(length_px[:, None] * omega / (2.0 * np.pi)) ** 2
+    expected = exact[:, : 4 * found.shape[1]].reshape(3, -1, 4).mean(axis=2)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
