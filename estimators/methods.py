@@ -44,12 +44,12 @@ def estimate_stack(
     prior_px: tuple[float, float] | None = None,
 ) -> MotionEstimate:
     """Run one method over grey frames of one size, motion along the rows."""
+    if method == "composite":
+        return fit_composite(stack, frame_period_s)
     span_s = (len(stack) - 1) * frame_period_s
     reason = why_unusable(stack)
     if reason:
         return refused(reason, signed=method == "joint", window_s=span_s, method=method)
-    if method == "composite":
-        return fit_composite(stack, frame_period_s, exposure_s)
     if method == "single":
         return fit_single([stack[len(stack) // 2]], frame_period_s, exposure_s)
     if method in BASELINES:

@@ -17,19 +17,19 @@ LAST_FREQUENCY = 0.3
 
 
 @kernel
-def step_power(rows: NDArray[np.uint32], out: Array) -> None:
+def step_power(rows: NDArray[np.float32], out: Array) -> None:
     """Mean squared difference of neighbouring columns for every column modulo the block, ``out`` (8,)."""
     count = np.zeros(BLOCK_PX)
     out[:] = 0.0
-    for r in range(0, rows.shape[0], EVERY):
+    for r in range(rows.shape[0]):
         for c in range(rows.shape[1] - 1):
-            step = float(rows[r, c + 1]) - float(rows[r, c])
+            step = rows[r, c + 1] - rows[r, c]
             out[c % BLOCK_PX] += step * step
             count[c % BLOCK_PX] += 1.0
     out /= count
 
 
-def blocky(rows: NDArray[np.uint32]) -> bool:
+def blocky(rows: NDArray[np.float32]) -> bool:
     """Whether the steps between columns (r, w) are larger at the borders of blocks of 8 px.
 
     A wall has no reason to prefer one column in eight, whatever its texture and its motion; a codec has.

@@ -14,7 +14,6 @@ from axialnav.estimators.spectral.fit import best_blur
 from axialnav.estimators.spectral.picture import Spectra, composite_rows
 from axialnav.estimators.spectral.strips import wall_spectra
 from axialnav.estimators.spectral.verdict import why_refused, why_unusable
-from axialnav.estimators.spectral.whittle import BLUR
 from axialnav.models.camera import ExposureBlur
 
 SHORTEST_PX = 3.0
@@ -62,11 +61,10 @@ def fit_single(
     spectra = averaged(seen)
     usable = np.asarray(spectra.frequency < highest_frequency)
     fit = best_blur(spectra, usable, LOWEST_PX, spectra.length / REACH)
-    blur = float(fit.theta[BLUR])
-    reason = why_refused(fit, blur, SHORTEST_PX)
+    reason = why_refused(fit, SHORTEST_PX)
     if reason:
         return refused(reason, signed=False, window_s=exposure_s, method="single")
-    displacement = ExposureBlur(blur, exposure_s).displacement_px(frame_period_s)
+    displacement = ExposureBlur(fit.blur_px, exposure_s).displacement_px(frame_period_s)
     sigma = ExposureBlur(fit.sigma_px, exposure_s).displacement_px(frame_period_s)
     return MotionEstimate(displacement, sigma, math.nan, True, MotionReason.GOOD, False, exposure_s, method="single")
 

@@ -1,4 +1,4 @@
-"""Whether frames can be read at all, and whether a fitted spectrum is to be believed."""
+"""Whether frames can be read at all, and whether the blur of a fitted spectrum is to be believed."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from axialnav.estimators.spectral.fit import Fit
 
 MIN_MARGIN, MIN_LIGHT = 12.0, 3.0  # noise among all lengths wins by 7 in one picture of fifty
 MAX_EXCESS = 10.0  # pictures that are no walls and codecs reach 8
-MAX_GAP, MIN_EVEN = 3.0, 3.0
-EVEN_SHARE = 0.03  # of the margin: slow combs, half a ridge in view, look alike with a frame missing, up to half of it
 MAX_SHARE, MAX_SIGMA_PX = 0.1, 0.5
 
 
@@ -28,27 +26,19 @@ def _same(a: Image, b: Image) -> bool:
     return bool((a[0] == b[0]).all() and (a == b).all())
 
 
-def why_refused(fit: Fit, length_px: float, shortest_px: float) -> str:
+def why_refused(fit: Fit, shortest_px: float) -> str:
     """Why a fit is not believed; "" if it is.
 
-    It must beat every other length, no motion among them; not be explained better by a missing frame, which would
-    change the length by a fifth or more; show light beyond its first dark line; and be longer than what can be told
-    from a lens.  What the model does not explain makes likelihoods count less.
+    It must beat every other length, no blur among them; show light beyond its first dark line; and be longer than what
+    can be told from a lens.  What the model does not explain makes likelihoods count less.
     """
-    if not (math.isfinite(fit.sigma_px) and math.isfinite(length_px)):
+    if not (math.isfinite(fit.sigma_px) and math.isfinite(fit.blur_px)):
         return MotionReason.AMBIGUOUS
     deflated = max(1.0, fit.excess)
     if min(fit.margin / deflated - MIN_MARGIN, fit.light / deflated - MIN_LIGHT) < 0.0:
         return MotionReason.AMBIGUOUS
     if fit.excess > MAX_EXCESS:
         return MotionReason.MODEL
-    if fit.gap > MAX_GAP * deflated:
-        return MotionReason.UNEVEN
-    if length_px < shortest_px:
+    if fit.blur_px < shortest_px:
         return MotionReason.SHORT
-    return MotionReason.SIGMA if fit.sigma_px > min(MAX_SHARE * length_px, MAX_SIGMA_PX) else ""
-
-
-def may_be_uneven(fit: Fit) -> bool:
-    """Whether the spectrum alone does not rule out that a frame is missing."""
-    return fit.gap > -MIN_EVEN * max(1.0, fit.excess) - EVEN_SHARE * fit.margin
+    return MotionReason.SIGMA if fit.sigma_px > min(MAX_SHARE * fit.blur_px, MAX_SIGMA_PX) else ""

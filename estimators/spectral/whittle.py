@@ -1,9 +1,9 @@
-r"""Whittle's likelihood of a mean power spectrum, maximised over the motion and everything that is not known besides.
+r"""Whittle's likelihood of a mean power spectrum, maximised over the blur and everything that is not known besides.
 
 .. math:: -\ell(\theta) = R \sum_f \Big[ \log M(f; \theta) + \frac{P(f)}{M(f; \theta)} \Big]
 
-for the mean power P of R rows.  The parameters are displacement, blur length, four of the texture's spectrum and the
-logarithm of the noise floor.  Fisher scoring with Levenberg's damping, so that starts far from the answer do no harm.
+for the mean power P of R rows.  The parameters are blur length, four of the texture's spectrum and the logarithm of the
+noise floor.  Fisher scoring with Levenberg's damping, so that starts far from the answer do no harm.
 
 Source: P. Whittle, Arkiv foer Matematik 2, 1953; K. Levenberg, Quart. Appl. Math. 2, 1944.
 """
@@ -15,15 +15,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from axialnav.estimators.spectral.shapes import comb
+from axialnav.estimators.spectral.shapes import exposure_power
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
-SHIFT, BLUR, TEXTURE, NOISE, PARAMETERS = 0, 1, 2, 6, 7
-UNTIED = -1.0
+BLUR, TEXTURE, NOISE, PARAMETERS = 0, 1, 5, 6
 MAX_EXPONENT = 60.0
 FAINT, FIRM, TINY = 0.05, 100.0, 1e-9  # FIRM: rows times looks that the prior is worth in a straight fit
-SHARING, SMALL, LEAST = 4, 1e-60, 1e-300
+SHARING, LEAST = 4, 1e-300
 FIRST_DAMPING, MAX_REFUSALS, ENOUGH = 1e-2, 6, 1e-7
 
 
@@ -51,11 +50,8 @@ def solve_spd(A: Array, b: Array) -> Array:
 
 
 @kernel
-def spectrum(theta: Array, tie: float, basis: Array, shape: Array, model: Array, gradient: Array) -> None:
-    """``M`` (f,) and the derivatives of ``log M`` (f, p) at ``theta`` from ``shape`` (f, 3), the output of ``comb``.
-
-    With ``tie`` >= 0 the blur is ``tie`` times the displacement and no parameter of its own.
-    """
+def spectrum(theta: Array, basis: Array, shape: Array, model: Array, gradient: Array) -> None:
+    """``M`` (f,) and the derivatives of ``log M`` (f, p) at ``theta`` from ``shape`` (f, 2), see ``exposure_power``."""
     noise = math.exp(min(theta[NOISE], MAX_EXPONENT))
     for j in range(model.shape[0]):
         exponent = 0.0
@@ -64,8 +60,7 @@ def spectrum(theta: Array, tie: float, basis: Array, shape: Array, model: Array,
         texture = math.exp(min(exponent, MAX_EXPONENT))
         model[j] = texture * shape[j, 0] + noise
         share = texture / model[j]
-        gradient[j, SHIFT] = share * (shape[j, 1] + max(tie, 0.0) * shape[j, 2])
-        gradient[j, BLUR] = share * shape[j, 2]
+        gradient[j, BLUR] = share * shape[j, 1]
         share *= shape[j, 0]
         for k in range(NOISE - TEXTURE):
             gradient[j, TEXTURE + k] = basis[j, k] * share
@@ -73,32 +68,29 @@ def spectrum(theta: Array, tie: float, basis: Array, shape: Array, model: Array,
 
 
 @kernel
-def misfit(power: Array, weight: Array, model: Array) -> float:
-    """``sum w [log M + P / M]``; numbers of equal weight share a logarithm, which is what takes the time."""
-    total, product, many = 0.0, 1.0, 0
+def misfit(power: Array, model: Array) -> float:
+    """``sum log M + P / M``; a few numbers share a logarithm, which is what takes the time."""
+    total, product = 0.0, 1.0
     for j in range(power.shape[0]):
-        total += weight[j] * power[j] / model[j]
+        total += power[j] / model[j]
         product *= model[j]
-        many += 1
-        last = many == SHARING or j + 1 == power.shape[0] or weight[j + 1] != weight[j]
-        if last or not SMALL < product < 1.0 / SMALL:
-            total += weight[j] * math.log(max(product, LEAST))
-            product, many = 1.0, 0
+        if j % SHARING == SHARING - 1 or j + 1 == power.shape[0]:
+            total += math.log(max(product, LEAST))
+            product = 1.0
     return total
 
 
 @kernel
-def normal_equations(power: Array, weight: Array, model: Array, gradient: Array, score: Array, J: Array) -> None:
+def normal_equations(power: Array, model: Array, gradient: Array, score: Array, J: Array) -> None:
     """Score (p,) and information (p, p) per row."""
     score[:] = 0.0
     J[:, :] = 0.0
     for j in range(power.shape[0]):
-        residual = weight[j] * (power[j] / model[j] - 1.0)
+        residual = power[j] / model[j] - 1.0
         for a in range(PARAMETERS):
             score[a] += residual * gradient[j, a]
-            part = weight[j] * gradient[j, a]
             for b in range(a + 1):
-                J[a, b] += part * gradient[j, b]
+                J[a, b] += gradient[j, a] * gradient[j, b]
     for a in range(PARAMETERS):
         for b in range(a):
             J[b, a] = J[a, b]
@@ -130,7 +122,7 @@ def climb_step(theta: Array, free: NDArray[np.bool_], prior: Array, score: Array
 
 
 @kernel
-def straight_start(theta: Array, shape: Array, power: Array, weight: Array, basis: Array, prior: Array) -> None:
+def straight_start(theta: Array, shape: Array, power: Array, basis: Array, prior: Array) -> None:
     """Set the texture of ``theta`` by a straight fit of ``log (P - s) - log G``: near enough for Fisher's steps."""
     size = NOISE - TEXTURE
     A, b = np.zeros((size, size)), np.zeros(size)
@@ -138,7 +130,7 @@ def straight_start(theta: Array, shape: Array, power: Array, weight: Array, basi
     for j in range(power.shape[0]):
         texture = max(power[j] - noise, FAINT * power[j])
         share = texture / power[j] * shape[j, 0] / (shape[j, 0] + FAINT)
-        heard = weight[j] * share * share
+        heard = share * share
         value = math.log(texture / (shape[j, 0] + TINY))
         for a in range(size):
             b[a] += heard * basis[j, a] * value
@@ -154,42 +146,33 @@ def straight_start(theta: Array, shape: Array, power: Array, weight: Array, basi
 @kernel
 def maximise(
     start: Array,
-    tie: float,
     free: NDArray[np.bool_],
-    lags: Array,
     frequency: Array,
-    window: Array,
-    floor: float,
     power: Array,
-    weight: Array,
     basis: Array,
     prior: Array,
-    fresh: bool,
     steps: int,
 ) -> tuple[Array, float]:
     """Climb from ``start`` (p,) over the parameters that are ``free``; their ``prior`` (2, p) is mean and 1 / variance.
 
-    ``weight`` (f,) counts the frequencies that each number stands for; ``fresh`` asks for a new
-    texture to start from.  Returns the parameters and the misfit there.
+    The texture to start from is fitted anew.  Returns the parameters and the misfit there.
     """
     count = power.shape[0]
-    shape, model, gradient = np.empty((count, 3)), np.empty(count), np.empty((count, PARAMETERS))
+    shape, model, gradient = np.empty((count, 2)), np.empty(count), np.empty((count, PARAMETERS))
     score, J = np.empty(PARAMETERS), np.empty((PARAMETERS, PARAMETERS))
     best, cost, damping = start.copy(), math.inf, FIRST_DAMPING
     trial = start.copy()
     refusals = 0
     for _ in range(steps + 1):
-        if tie >= 0.0:
-            trial[BLUR] = tie * trial[SHIFT]
-        comb(trial[SHIFT], trial[BLUR], lags, frequency, window, floor, shape)
-        if fresh and cost == math.inf:
-            straight_start(trial, shape, power, weight, basis, prior)
-        spectrum(trial, tie, basis, shape, model, gradient)
-        value = misfit(power, weight, model) + pull(trial, prior)
+        exposure_power(frequency, trial[BLUR], shape)
+        if cost == math.inf:
+            straight_start(trial, shape, power, basis, prior)
+        spectrum(trial, basis, shape, model, gradient)
+        value = misfit(power, model) + pull(trial, prior)
         if value < cost:
             gain = cost - value
             best, cost, damping, refusals = trial.copy(), value, 0.2 * damping, 0
-            normal_equations(power, weight, model, gradient, score, J)
+            normal_equations(power, model, gradient, score, J)
             if gain < ENOUGH * abs(cost):
                 break
         else:
@@ -197,7 +180,7 @@ def maximise(
             if refusals > MAX_REFUSALS:
                 break
         step = climb_step(best, free, prior, score, J, damping)
-        while not (np.all(np.isfinite(step)) and best[SHIFT] + step[SHIFT] >= 0.0 and best[BLUR] + step[BLUR] >= 0.0):
+        while not (np.all(np.isfinite(step)) and best[BLUR] + step[BLUR] >= 0.0):
             damping = 10.0 * damping
             if damping > 1e12:
                 return best, cost
