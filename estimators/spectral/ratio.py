@@ -44,7 +44,7 @@ ROOM = (math.inf, 0.02, math.inf, 0.006, 0.01)  # standard deviations; those of 
 TOP_FREQUENCY = 0.45
 RIDGE, NEAR, ENOUGH = 1e-12, 0.1, 1e-6
 CURVE_LAG, SMALL = 20, 1e-5
-MOST_NOISE, CODEC_NOISE = 1.1, 2.0  # of the faintest bins, which codecs make fainter than others
+MOST_NOISE, CODEC_NOISE = 1.1, 8.0  # of the faintest bins, which codecs make fainter than others
 
 
 @dataclass(frozen=True)
@@ -210,15 +210,16 @@ def misfit(
     common, noise = theta[COMMON], theta[NOISE]
     for j in range(value.shape[0]):
         comb, u, e = shape[j, 0], faint[j], single[j]
-        model = share * e + comb * (common * e - noise * u) + theta[STATIC] * e + theta[WHITE] * u
+        quiet = min(noise * u, MOST_NOISE)
+        model = share * e + comb * (common * e - quiet) + theta[STATIC] * e + theta[WHITE] * u
         residual[j] = value[j] - model
-        dark = min(max(noise * u, 0.0), 1.0)
+        dark = min(max(quiet, 0.0), 1.0)
         bright = min(max(share + comb * (1.0 - dark) * min(common, 1.0), 0.0), 1.0)
         spread = (1.0 - (1.0 - dark) ** 2) * share + EDGE
         weight[j] = heard[j] / (spread * max(bright * (1.0 - bright), FLAT))
-        gradient[j, SHIFT] = shape[j, 1] * (common - noise * u)
+        gradient[j, SHIFT] = shape[j, 1] * (common - quiet)
         gradient[j, COMMON] = comb
-        gradient[j, NOISE] = -comb * u
+        gradient[j, NOISE] = -comb * u if quiet < MOST_NOISE else 0.0
         gradient[j, STATIC] = 1.0
         gradient[j, WHITE] = u
 

@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 from axialnav.estimators.spectral.copies import Copies
 from axialnav.estimators.spectral.look import candidates
 from axialnav.estimators.spectral.picture import WINDOW_LOOKS
-from axialnav.estimators.spectral.ratio import COMMON, NOISE, SHIFT, STATIC, STILL_PX, WHITE, Ratio, ratio_of
+from axialnav.estimators.spectral.ratio import (
+    COMMON,
+    MOST_NOISE,
+    NOISE,
+    SHIFT,
+    STATIC,
+    STILL_PX,
+    WHITE,
+    Ratio,
+    ratio_of,
+)
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
@@ -167,7 +177,7 @@ def strip_residuals(
         for s in range(part.shape[0]):
             single = apart[s, f] * inverse[f]
             model = single * (share + comb[f] * theta[COMMON] + theta[STATIC])
-            model += faint[f] * (theta[WHITE] - comb[f] * theta[NOISE])
+            model += faint[f] * theta[WHITE] - comb[f] * min(theta[NOISE] * faint[f], MOST_NOISE)
             residual = part[s] * (together[s, f] * inverse[f] * share - model)
             pulls[s] += influence[f] * residual
             total += residual
