@@ -20,6 +20,7 @@ from axialnav.estimators.spectral.verdict import why_unusable
 
 LEAST_FRAMES = 2
 LARGEST_PX, SHORTEST_PX = 128.0, 0.45
+SHORTEST_CODED_PX = 1.0  # where a codec leaves only the lower frequencies
 MIN_MARGIN = 100.0  # noise with a pattern fixed to the camera reaches 70
 RIVAL_SHARE = 0.08  # of what motion gains: on a wall that repeats itself, another displacement loses hardly more
 MAX_EXCESS, MIN_COMMON = 6.0, 0.85  # frames of one wall, moving evenly, have 1 and 1
@@ -44,7 +45,7 @@ def fit_composite(frames: Frames, frame_period_s: float) -> MotionEstimate:
     Returns
     -------
     MotionEstimate
-        Refused with a reason where the frames do not tell; displacements from 0.45 px up to 128 px or half the
+        Refused with a reason where the frames do not tell; displacements from 0.45 px (1 px behind a codec) up to 128 px or half the
         picture's width over N - 1, whichever is less.
 
     Raises
@@ -62,7 +63,7 @@ def fit_composite(frames: Frames, frame_period_s: float) -> MotionEstimate:
     if copies is None:
         return refused(MotionReason.BANDS, signed=False, window_s=span_s, method="composite")
     reading = read_comb(copies, usable, min(LARGEST_PX, stack[0].shape[1] / (2.0 * (len(stack) - 1))))
-    reason = why_not(reading, copies)
+    reason = why_not(reading, copies, SHORTEST_PX if usable.all() else SHORTEST_CODED_PX)
     if reason:
         return refused(reason, signed=False, window_s=span_s, method="composite")
     displacement = reading.displacement_px
@@ -72,7 +73,7 @@ def fit_composite(frames: Frames, frame_period_s: float) -> MotionEstimate:
     )
 
 
-def why_not(reading: Reading, copies: Copies) -> str:
+def why_not(reading: Reading, copies: Copies, shortest_px: float = SHORTEST_PX) -> str:
     """Why a reading is not believed; "" if it is.
 
     It must beat no motion and every other displacement; be what copies of one wall leave; not be explained better by a
@@ -89,7 +90,7 @@ def why_not(reading: Reading, copies: Copies) -> str:
         return MotionReason.BANDS
     if reading.excess > MAX_EXCESS or reading.common < MIN_COMMON:
         return MotionReason.MODEL
-    if reading.displacement_px < SHORTEST_PX:
+    if reading.displacement_px < shortest_px:
         return MotionReason.SHORT
     if reading.sigma_px > min(MAX_SHARE * reading.displacement_px, MAX_SIGMA_PX):
         return MotionReason.SIGMA
