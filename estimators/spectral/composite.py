@@ -45,8 +45,8 @@ def fit_composite(frames: Frames, frame_period_s: float) -> MotionEstimate:
     Returns
     -------
     MotionEstimate
-        Refused with a reason where the frames do not tell; displacements from 0.45 px (1 px behind a codec) up to 128 px or half the
-        picture's width over N - 1, whichever is less.
+        Refused with a reason where the frames do not tell; displacements from 0.45 px (1 px behind a codec) up to
+        128 px or half the picture's width over N - 1, whichever is less.
 
     Raises
     ------
