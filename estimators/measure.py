@@ -26,12 +26,13 @@ from axialnav.estimators.integrity import (
     white,
 )
 from axialnav.estimators.joint import Fit
-from axialnav.estimators.kappa import UNKNOWN, blur_ratio
+from axialnav.estimators.kappa import UNKNOWN, Kappa, blur_ratio
 from axialnav.estimators.layout import BANDS, STRIPS
 from axialnav.estimators.products import Products
 from axialnav.estimators.refine import fit_strips, follow
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
 from axialnav.estimators.search import Profiles, search_step
+from axialnav.estimators.skew import skew_variance
 from axialnav.estimators.spectrum import LAST_FREQUENCY
 from axialnav.estimators.stretch import stretch_variance
 from axialnav.estimators.window import FrameWindow
@@ -135,8 +136,10 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     kappa = UNKNOWN
     if options.kappa:
         kappa = blur_ratio(fit, products.band, products.rows.sum(axis=0), options.exposure_ratio)
-    if frames == 2 and kappa.alarming:
-        return refused(MotionReason.KAPPA, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
+    skew = skew_variance(fit, products, options.exposure_ratio)
+    reason = doubt_pair(kappa, skew) if frames == 2 else ""
+    if reason:
+        return refused(reason, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
     if window.stretch.stale():
         re, im, offset = window.halves(products.band)
         apart = stretch_variance(re, im, products.band, offset.astype(np.float64), fit)
@@ -144,7 +147,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     cross_px, cross_sigma_px = cross_or_nan(drift)
     return MotionEstimate(
         float(fit.motion[0]),
-        math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames) + window.stretch.variance),
+        math.sqrt(float(fit.covariance[0, 0]) + shake_variance(left, frames) + window.stretch.variance + skew),
         cross_px,
         True,
         MotionReason.GOOD,
@@ -156,6 +159,13 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         cross_sigma_px=cross_sigma_px,
         coherence_px=coherence_px(fit, products),
     )
+
+
+def doubt_pair(kappa: Kappa, skew_px2: float) -> str:
+    """Why two frames are not believed, of which nothing but their blur tells whether the motion was even."""
+    if kappa.alarming:
+        return MotionReason.KAPPA
+    return MotionReason.SIGMA if skew_px2 > MAX_SIGMA_PX**2 else ""
 
 
 def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, options: JointOptions) -> str:

@@ -43,9 +43,10 @@ def follow(
         products = window.following(start_px, drift_px, reach)
         return products.selected(strips | window.cleared)
 
-    harmless_px = hidden_drift_px(window.bin_height, len(window.order))
+    hidden_px, steps = hidden_drift_px(window.bin_height, len(window.order)), len(window.order) - 1
+    harmless_px = hidden_px * steps / (steps + steps % 2)  # of two frames one keeps its place, the other moves twice
     drift = UNMOVED
-    if harmless_px < FAST_DRIFT_PX:
+    if hidden_px < FAST_DRIFT_PX:
         drift = window.drift(start_px)
     belief = window.drift_belief
     if abs(drift.cross_px) < harmless_px:

@@ -127,7 +127,8 @@ class FrameWindow:
         order, anchor = self.order, self._anchor
         anchor.aim(order, displacement_px)
         times = centred_times(len(order))
-        along, down = (np.rint(step_px * times).astype(np.int64) for step_px in (displacement_px, drift_px))
+        along = np.rint(displacement_px * times).astype(np.int64)
+        down = np.rint(drift_px * np.ceil(times)).astype(np.int64)  # one of two keeps its place: halves round twice
         start, offset = np.array([anchor.start[slot] for slot in order]), anchor.offsets(order)
         if down.any():
             planes, slots, serial = self._moved_down(down), np.arange(len(order)), np.zeros(0, dtype=np.int64)

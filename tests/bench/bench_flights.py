@@ -18,6 +18,7 @@ from axialnav.replay.flight import Flight, load_flight
 from axialnav.replay.reference import match
 from axialnav.replay.run import Run, replay
 from tests.bench.flights import CASES, CHANGES, FLIGHTS, VARIANTS, Case
+from tests.bench.handheld import floor_table
 from tests.bench.markdown import machine, number, table
 from tests.bench.slider import slider_table
 from tests.bench.wrong_uwb import wrong_uwb_tables
@@ -154,7 +155,13 @@ def tables(cases: Sequence[Case], folder: Path, variants: Mapping[str, Mapping[s
 
 def main() -> None:
     """Print all tables."""
-    parts = (machine(), tables(CASES, FLIGHTS), wrong_uwb_tables(FLIGHTS), slider_table(FLIGHTS))
+    parts = (
+        machine(),
+        tables(CASES, FLIGHTS),
+        wrong_uwb_tables(FLIGHTS),
+        slider_table(FLIGHTS),
+        floor_table(FLIGHTS.parent),
+    )
     sys.stdout.write("\n\n".join(parts) + "\n")
 
 

@@ -13,6 +13,7 @@ from axialnav.replay.sample_flights import sample_flight_path
 from tests.bench import bench_fusion
 from tests.bench.bench_flights import tables
 from tests.bench.flights import DEFAULT, PLAIN, Case
+from tests.bench.handheld import floor_table
 from tests.bench.slider import slider_table
 from tests.bench.slider_scene import ripple
 
@@ -38,6 +39,7 @@ def test_the_flight_tables_show_a_limit_that_is_kept_and_one_that_is_not() -> No
 
 def test_recordings_that_are_not_there_are_named(tmp_path: Path) -> None:
     assert tables((Case("nowhere"),), tmp_path) == f"skipped: nowhere is not in {tmp_path}"
+    assert floor_table(tmp_path) == f"skipped: frames_240fps is not in {tmp_path}"
     assert slider_table(tmp_path) == f"skipped: davis_slider_far is not in {tmp_path}"
 
 

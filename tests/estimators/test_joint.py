@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from axialnav.estimators.estimate import MotionEstimate, MotionReason, estimate_motion
 from axialnav.estimators.measure import JointOptions, measure_joint
@@ -57,6 +58,22 @@ def test_drift_across_the_rows_is_seen_and_followed() -> None:
     estimate = estimate_motion(picture.frames, frame_period_s=PERIOD_S)
     assert estimate.cross_px == pytest.approx(2.0, abs=0.15)
     assert estimate.displacement_px == pytest.approx(9.0, abs=0.04)
+
+
+@pytest.mark.parametrize("drift_px", [1, 3])
+def test_two_frames_of_slanted_lines_are_followed_across_the_rows(drift_px: int) -> None:
+    """Half of the texture leans: a row that is one too high shows it 0.8 px too far, and all rows agree about that."""
+    rng = np.random.default_rng(3)
+    row, column = np.mgrid[0:420, 0:900]
+    upright = ndimage.gaussian_filter(rng.normal(size=(420, 900)), 1.0)
+    long = ndimage.gaussian_filter(rng.normal(size=(420, 1400)), (8.0, 1.0))
+    leaning = ndimage.map_coordinates(long, [row, column + 0.8 * row], order=1)
+    wall = 110.0 + 6.0 * (upright / upright.std() + leaning / leaning.std())
+    cuts = [wall[20 + k * drift_px :, 40 + 6 * k :][:300, :520] for k in range(2)]
+    frames = [np.rint(cut + rng.normal(0.0, 1.0, cut.shape)).clip(0, 255).astype(np.uint8) for cut in cuts]
+    estimate = estimate_motion(frames, frame_period_s=PERIOD_S)
+    assert estimate.displacement_px == pytest.approx(-6.0, abs=0.01)
+    assert estimate.cross_px == pytest.approx(-drift_px, abs=0.15)
 
 
 @pytest.mark.parametrize("displacement_px", [7, -23])
