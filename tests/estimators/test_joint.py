@@ -73,7 +73,7 @@ def test_two_frames_of_slanted_lines_are_followed_across_the_rows(drift_px: int)
     frames = [np.rint(cut + rng.normal(0.0, 1.0, cut.shape)).clip(0, 255).astype(np.uint8) for cut in cuts]
     estimate = estimate_motion(frames, frame_period_s=PERIOD_S)
     assert estimate.displacement_px == pytest.approx(-6.0, abs=0.01)
-    assert estimate.cross_px == pytest.approx(-drift_px, abs=0.15)
+    assert estimate.cross_px == pytest.approx(-drift_px, abs=0.4)
 
 
 @pytest.mark.parametrize("displacement_px", [7, -23])
