@@ -27,7 +27,6 @@ FLANK_PX = 12
 SURE, PERHAPS = 5.0, 2.0
 OUTSTANDING = 3.0  # times the power of the usual cell: more than walls are uneven
 STILL_SHARE = 0.6  # of the power of the shifted sum; a wall that moves keeps less when it is not shifted
-TELLING_FRAMES = 3  # of two frames a wall that moves keeps half of it, give or take as much as that
 LEAST_TRAVEL_PX = 1
 LEAST_SHARE = 0.3
 
@@ -174,10 +173,8 @@ class OccluderFinder:
             return surely
         self._powers(planes, order, shift, ~doubtful, moving)
         perhaps = (still[1] - moving[1] > PERHAPS * noise) & (still[1] - usual > PERHAPS * noise)
-        if len(order) >= TELLING_FRAMES:
-            strong = (np.minimum(one[0], still[0]) > OUTSTANDING * usual) & (still[0] > STILL_SHARE * moving[0])
-            perhaps |= strong
-        return connected(surely | perhaps, surely)
+        strong = (np.minimum(one[0], still[0]) > OUTSTANDING * usual) & (still[0] > STILL_SHARE * moving[0])
+        return connected(surely | perhaps | strong, surely)
 
     def _powers(self, planes: Plane, order: Index, shift: Index, wanted: Mask, out: Array) -> None:
         _cell_powers(planes, order, shift, self._spans, wanted, self._sums, out)
