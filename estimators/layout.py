@@ -39,15 +39,16 @@ class RowLayout:
     levels, classes
         Depth of the transform, and number of classes (smooth rows first, then from coarse to fine differences).
     used
-        Rows that take part; the rest at the bottom is less than one block.
+        Rows that take part; the rest is less than one block.
     place
         Output row of coefficient j of block b, shape (blocks * 2^levels,).
     edges
         First output row of every class of every strip, and the end, shape (strips * classes + 1,).
     strip_edges
         First output row of every strip, and the end, shape (strips + 1,).
-    height
-        Middle of every strip, -1 at the top and 1 at the bottom of all rows, shape (strips,).
+    height, band_height
+        Middle of every strip and of every band, -1 at the top and 1 at the bottom of the rows that take part, shapes
+        (strips,) and (bands,).
     count
         Coefficient rows per strip and class, shape (strips, classes).
     smooth
@@ -68,7 +69,8 @@ class RowLayout:
         blocks = rows // size
         self.used = blocks * size
         starts = np.linspace(0, blocks, STRIPS + 1).astype(np.int64)
-        self.height = (starts[:-1] + starts[1:]) * size / rows - 1.0
+        self.height = (starts[:-1] + starts[1:]) / blocks - 1.0
+        self.band_height = self.height.reshape(BANDS, -1).mean(axis=1)
         per_class = np.array([1, *(1 << level for level in range(self.levels))], dtype=np.int64)
         self.count = np.diff(starts)[:, None] * per_class[None]
         self.edges = np.concatenate([[0], np.cumsum(self.count)]).astype(np.int64)
@@ -135,6 +137,7 @@ def binned_coefficients(
         Sum of every block first, then differences from coarse to fine, shape (rows, w).
     """
     size = 1 << levels
+    _copy(frame, 0, first_row, kept)
     for block in range(place.shape[0] // size):
         for j in range(size):
             top = first_row + (block * size + j) * height
@@ -178,12 +181,11 @@ def _join(line: Plane, total: Plane) -> None:
 
 @kernel
 def remove_level(rows: Plane, smooth: Index, means: Plane) -> None:
-    """Take the level of every column, then that of every row, off the smooth rows.
+    """Take the level of every column off the smooth rows: the median over five bands of its mean in the band.
 
-    The level of a column is the median over five bands of its mean in the band.  It is where columns of the sensor,
-    vignettes and upright objects fixed to the camera live, and a wall that moves leaves almost nothing of itself there.
-    A plain mean would smear an object in one band over all rows.  What a vignette or a flickering lamp leaves is a
-    level per row: in the same way, the median over five parts of the row.  Differences of rows hold none of it.
+    It is where columns of the sensor, vignettes and upright objects fixed to the camera live, and a wall that moves
+    leaves almost nothing of itself there.  A plain mean would smear an object in one band over all rows.  Differences
+    of rows hold none of it.
 
     Parameters
     ----------
@@ -207,35 +209,6 @@ def remove_level(rows: Plane, smooth: Index, means: Plane) -> None:
     for s in range(strips):
         for r in range(smooth[s, 0], smooth[s, 1]):
             _subtract(means[0], rows[r])
-    for s in range(strips):
-        for r in range(smooth[s, 0], smooth[s, 1]):
-            _subtract_level(rows[r], means[:, :1])
-
-
-@kernel
-def _subtract_level(line: Plane, means: Plane) -> None:
-    """Subtract the median over five parts of ``line`` (w,) of their means; ``means`` (5, 1) is scratch."""
-    width = line.shape[0]
-    for part in range(BANDS):
-        first, end = part * width // BANDS, (part + 1) * width // BANDS
-        means[part, 0] = _sum(line[first:end]) / np.float32(max(end - first, 1))
-    _median(means[0], means[1], means[2], means[3], means[4])
-    level = means[0, 0]
-    for c in range(width):
-        line[c] -= level
-
-
-@kernel
-def _sum(line: Plane) -> np.float32:
-    """Sum of a line, eight numbers at a time: that is four times as fast."""
-    total, at = np.float32(0.0), 0
-    while at + 8 <= line.shape[0]:
-        t = line[at : at + 8]
-        total += ((t[0] + t[1]) + (t[2] + t[3])) + ((t[4] + t[5]) + (t[6] + t[7]))
-        at += 8
-    for c in range(at, line.shape[0]):
-        total += line[c]
-    return total
 
 
 @kernel

@@ -28,9 +28,11 @@ from axialnav.estimators.integrity import (
 from axialnav.estimators.joint import Fit
 from axialnav.estimators.kappa import UNKNOWN, Kappa, blur_ratio
 from axialnav.estimators.layout import BANDS, STRIPS
+from axialnav.estimators.positions import centred_times
 from axialnav.estimators.products import Products
 from axialnav.estimators.refine import fit_strips, follow
 from axialnav.estimators.result import MotionEstimate, MotionReason, refused
+from axialnav.estimators.roll import steady_roll, unrolled
 from axialnav.estimators.search import Profiles, search_step
 from axialnav.estimators.skew import skew_variance
 from axialnav.estimators.spectrum import LAST_FREQUENCY
@@ -116,7 +118,9 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     if len(grid) < LEAST_STEPS:
         return refused(MotionReason.PRIOR_OUTSIDE, signed=True, window_s=span_s, method="joint")
     found = window.coarse.profiles(window.order, grid)
-    choice = choose(found, options.consensus)
+    choice, roll_px = choose(found, options.consensus), 0.0
+    if options.consensus:
+        found, choice, roll_px = _levelled(found, choice, window.layout.band_height)
     votes = (int(choice.agree.sum()), BANDS)
     reason = doubt_search(found, choice, options)
     if reason:
@@ -126,6 +130,8 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     slow = abs(start_px) < SURELY_MOVING_PX
     reach = LAST_FREQUENCY if slow and window.coarse.repeats(window.order) else found.reach
     drift, products = follow(window, start_px, strips, options.exposure_ratio, reach)
+    if roll_px:
+        products = unrolled(products, roll_px * centred_times(frames))
     fit, lost = fit_strips(products, start_px, options.exposure_ratio, options.consensus)
     if lost + STRIPS - len(products.rows) > MAX_LOST_STRIPS:
         return refused(MotionReason.BANDS, signed=True, window_s=span_s, method="joint", bands=votes)
@@ -166,6 +172,15 @@ def doubt_pair(kappa: Kappa, skew_px2: float) -> str:
     if kappa.alarming:
         return MotionReason.KAPPA
     return MotionReason.SIGMA if skew_px2 > MAX_SIGMA_PX**2 else ""
+
+
+def _levelled(found: Profiles, choice: Choice, height: Array) -> tuple[Profiles, Choice, float]:
+    """Likelihoods and choice without a steady roll, and what it moves a band at height 1 by [px per frame]."""
+    roll_px = steady_roll(found, choice.index, height)
+    if not roll_px:
+        return found, choice, roll_px
+    found = found.sheared(roll_px * height)
+    return found, choose(found), roll_px
 
 
 def doubt_fit(fit: Fit | None, left: Residual | None, products: Products, options: JointOptions) -> str:

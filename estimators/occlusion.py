@@ -26,7 +26,8 @@ CELL_PX = 16
 FLANK_PX = 12
 SURE, PERHAPS = 5.0, 2.0
 OUTSTANDING = 3.0  # times the power of the usual cell: more than walls are uneven
-STILL_SHARE = 0.6  # of the power of the shifted sum; a wall that moves keeps less when it is not shifted
+STILL_SHARE = 0.8  # of the power of frames that are all alike there, and of the shifted sum
+LARGEST_SHARE = 0.3  # of the picture that objects may seem to hide: beyond, only those cells that surely do
 LEAST_TRAVEL_PX = 1
 LEAST_SHARE = 0.3
 
@@ -173,8 +174,11 @@ class OccluderFinder:
             return surely
         self._powers(planes, order, shift, ~doubtful, moving)
         perhaps = (still[1] - moving[1] > PERHAPS * noise) & (still[1] - usual > PERHAPS * noise)
-        strong = (np.minimum(one[0], still[0]) > OUTSTANDING * usual) & (still[0] > STILL_SHARE * moving[0])
-        return connected(surely | perhaps | strong, surely)
+        own, alike = np.maximum(one[0] - usual, 0.0), still[0] - usual
+        strong = own > (OUTSTANDING - 1.0) * usual
+        strong &= alike > STILL_SHARE * np.maximum(len(order) * own, moving[0] - usual)
+        grown = connected(surely | perhaps | strong, surely)
+        return grown if grown.mean() < LARGEST_SHARE else surely
 
     def _powers(self, planes: Plane, order: Index, shift: Index, wanted: Mask, out: Array) -> None:
         _cell_powers(planes, order, shift, self._spans, wanted, self._sums, out)

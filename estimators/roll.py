@@ -2,6 +2,9 @@ r"""Roll of the camera from frame to frame: it moves the upper strips one way an
 
 A small roll :math:`\phi_k` of frame k about the optical axis adds :math:`y_s \phi_k` to the position of a strip at the
 height :math:`y_s`.  It is found from the strips' scores, and taken out of the products by a turn of their phases.
+
+Scores only tell of a fraction of a pixel.  A camera that rolls steadily puts the peaks of the search's bands on a line
+over their height; that line is where the steps begin.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from axialnav.estimators.extra import extra_step
 from axialnav.estimators.joint import WINDOW_VARIANCE, Fit
 from axialnav.estimators.positions import free_positions, motion_basis, relative_turn, turns
 from axialnav.estimators.products import Products
+from axialnav.estimators.search import SOFTENING, TINY, Profiles
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
@@ -22,6 +26,9 @@ Plane = NDArray[np.float32]
 Index = NDArray[np.int64]
 CHI2_OFFSET, CHI2_PER_DOF = 16.0, 3.5
 MAX_STEP_PX = 0.6
+ENOUGH_BANDS, SURE_BAND = 4, 6.0  # bands that must have a peak, in standard deviations of unrelated frames
+LEAST_SPREAD_PX, OFF_LINE_PX = 0.2, 0.2
+BETTER = 8.0  # softened log-likelihood that the line must gain
 
 
 def roll_step(fit: Fit, height: Array) -> Array | None:
@@ -37,6 +44,35 @@ def roll_step(fit: Fit, height: Array) -> Array | None:
         return None
     shift = free @ step
     return np.asarray(shift * min(1.0, MAX_STEP_PX / float(np.abs(shift).max())))
+
+
+def steady_roll(found: Profiles, index: int, height: Array) -> float:
+    """Displacement per frame at height 1 less that in the middle [px], where the bands' peaks lie on a line; else 0.
+
+    Parameters
+    ----------
+    found
+        Likelihoods of the bands.
+    index
+        Grid point that was chosen for all of them.
+    height
+        Place of every band, from -1 at the top to 1 at the bottom, shape (b,).
+    """
+    gain, best = found.gain, found.gain.max(axis=1)
+    sure = best > SURE_BAND * found.spread
+    if int(sure.sum()) < ENOUGH_BANDS or float((best - gain[:, index])[sure].sum()) < BETTER * SOFTENING:
+        return 0.0
+    gain, place, step = gain[sure], gain[sure].argmax(axis=1), float(found.grid_px[1] - found.grid_px[0])
+    if place.min() == 0 or place.max() == gain.shape[1] - 1:
+        return 0.0
+    left, middle, right = (gain[np.arange(len(gain)), place + k].astype(np.float64) for k in (-1, 0, 1))
+    peak = found.grid_px[place] + 0.5 * step * (right - left) / np.maximum(2.0 * middle - left - right, TINY)
+    lever = height[sure] - height[sure].mean()
+    slope = float(lever @ peak / (lever @ lever))
+    if np.ptp(peak) < LEAST_SPREAD_PX or np.abs(peak - peak.mean() - slope * lever).max() > OFF_LINE_PX:
+        return 0.0
+    level = replace(found, gain=gain).sheared(slope * lever).everyone.max() - gain.sum(axis=0).max()
+    return slope if level > BETTER * SOFTENING else 0.0
 
 
 def unrolled(products: Products, shift_px: Array) -> Products:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -61,6 +61,12 @@ class Profiles:
         total = np.empty(self.gain.shape[1], dtype=np.float32)
         _sum_bands(self.gain, total)
         return total
+
+    def sheared(self, shift_px: Array) -> Profiles:
+        """The same with every band read ``shift_px`` further on (b,), to the nearest grid point."""
+        steps = np.rint(shift_px / (self.grid_px[1] - self.grid_px[0])).astype(np.int64)
+        place = np.clip(np.arange(self.gain.shape[1]) + steps[:, None], 0, self.gain.shape[1] - 1)
+        return replace(self, gain=np.take_along_axis(self.gain, place, axis=1))
 
     def total(self, bands: NDArray[np.bool_]) -> Plane:
         """Sum over some bands, shape (d,)."""

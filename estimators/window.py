@@ -47,6 +47,7 @@ class FrameWindow:
         self.size = frames
         self.layout = row_layout(height // self.bin_height)
         rows = self.layout.used
+        self._top = (height - rows * self.bin_height) // 2  # a roll about the axis must not look like displacement
         self._borrow, self._keep = borrow, hidden_drift_px(self.bin_height, frames) < FAST_DRIFT_PX
         self._images: list[Image] = [np.empty(self.shape, dtype=dtype) for _ in range(frames if self._keep else 1)]
         self._rows = np.empty((frames, rows, width), dtype=np.float32)
@@ -114,7 +115,15 @@ class FrameWindow:
     def _transform(self, image: Image, first_row: int, kept: Image, out: Plane) -> None:
         layout = self.layout
         binned_coefficients(
-            image, first_row, self.bin_height, layout.levels, layout.place, self._sums, self._work, kept, out
+            image,
+            self._top + first_row,
+            self.bin_height,
+            layout.levels,
+            layout.place,
+            self._sums,
+            self._work,
+            kept,
+            out,
         )
         remove_level(out, layout.smooth, self._means)
 

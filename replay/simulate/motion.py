@@ -32,6 +32,8 @@ class Trajectory:
         Independent x error of every frame, standard deviation [px]: unmeasured yaw.
     roll_jitter_rad
         Independent roll of every frame about the optical axis, standard deviation [rad].
+    roll_rate_rad
+        Steady roll about the optical axis per frame period, level in the middle of the window [rad].
     yaw_rad
         Constant angle between the optical axis and the wall's normal [rad].
     frame_times
@@ -44,12 +46,14 @@ class Trajectory:
     drift_px: float = 0.0
     jitter_px: float = 0.0
     roll_jitter_rad: float = 0.0
+    roll_rate_rad: float = 0.0
     yaw_rad: float = 0.0
     frame_times: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        numbers = (self.displacement_px, self.acceleration_px, self.drift_px, self.jitter_px, self.roll_jitter_rad)
-        if not all(math.isfinite(number) for number in numbers):
+        numbers = (self.displacement_px, self.acceleration_px, self.drift_px, self.jitter_px)
+        rolls = (self.roll_jitter_rad, self.roll_rate_rad)
+        if not all(math.isfinite(number) for number in (*numbers, *rolls)):
             raise ConfigError(f"every motion of a trajectory must be finite, got {self}")
         if not abs(self.yaw_rad) <= MAX_YAW_RAD:
             raise ConfigError(
@@ -70,7 +74,7 @@ class Trajectory:
             raise ConfigError(f"asked for {frames} frames, but the trajectory has {len(times)} frame times")
         middle = 0.5 * (max(times) + min(times))
         jitter = self.jitter_px * rng.standard_normal(frames)
-        roll = self.roll_jitter_rad * rng.standard_normal(frames)
+        roll = self.roll_jitter_rad * rng.standard_normal(frames) + self.roll_rate_rad * (np.array(times) - middle)
         for k in range(1, frames):
             if times[k] == times[k - 1]:  # the same picture delivered twice
                 jitter[k], roll[k] = jitter[k - 1], roll[k - 1]

@@ -134,6 +134,7 @@ BASE = CLEAN[1]
 DISTURBED = (
     Condition("acceleration 1 px/frame^2", 0.05, change=_random_sign("acceleration_px", 1.0)),
     Condition("roll jitter 0.3 deg", 0.05, change=motion(roll_jitter_rad=math.radians(0.3))),
+    Condition("steady roll 0.1 deg/frame", 0.05, change=_random_sign("roll_rate_rad", math.radians(0.1))),
     Condition("flicker 20 %", 0.05, change=light(flicker_depth=0.2, flicker_hz=97.0)),
     Condition("drift 2 px/frame", 0.05, change=_random_sign("drift_px", 2.0)),
     Condition("fixed pattern 1 %", 0.05, change=camera(pixel_pattern=0.01, column_pattern=0.01)),
