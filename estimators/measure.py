@@ -130,8 +130,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     slow = abs(start_px) < SURELY_MOVING_PX
     reach = LAST_FREQUENCY if slow and window.coarse.repeats(window.order) else found.reach
     drift, products = follow(window, start_px, strips, options.exposure_ratio, reach)
-    if roll_px:
-        products = unrolled(products, roll_px * centred_times(frames))
+    products = unrolled(products, roll_px * centred_times(frames)) if roll_px else products
     fit, lost = fit_strips(products, start_px, options.exposure_ratio, options.consensus)
     if lost + STRIPS - len(products.rows) > MAX_LOST_STRIPS:
         return refused(MotionReason.BANDS, signed=True, window_s=span_s, method="joint", bands=votes)

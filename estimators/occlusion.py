@@ -27,6 +27,7 @@ FLANK_PX = 12
 SURE, PERHAPS = 5.0, 2.0
 OUTSTANDING = 3.0  # times the power of the usual cell: more than walls are uneven
 STILL_SHARE = 0.8  # of the power of frames that are all alike there, and of the shifted sum
+ENOUGH_FRAMES = 3  # two look alike too easily
 LARGEST_SHARE = 0.3  # of the picture that objects may seem to hide: beyond, only those cells that surely do
 LEAST_TRAVEL_PX = 1
 LEAST_SHARE = 0.3
@@ -170,10 +171,11 @@ class OccluderFinder:
         moving[:] = 0.0
         self._powers(planes, order, shift, doubtful, moving)
         surely: Mask = np.asarray(repeats & (still[1] - moving[1] > SURE * noise))
-        if not surely.any():
+        if len(order) < ENOUGH_FRAMES or not surely.any():
             return surely
         self._powers(planes, order, shift, ~doubtful, moving)
-        perhaps = (still[1] - moving[1] > PERHAPS * noise) & (still[1] - usual > PERHAPS * noise)
+        fine = len(order) * (one[1] - usual - PERHAPS * noise)
+        perhaps = (still[1] - moving[1] > PERHAPS * noise) & (still[1] - usual > np.maximum(PERHAPS * noise, fine))
         own, alike = np.maximum(one[0] - usual, 0.0), still[0] - usual
         strong = own > (OUTSTANDING - 1.0) * usual
         strong &= alike > STILL_SHARE * np.maximum(len(order) * own, moving[0] - usual)
