@@ -41,6 +41,7 @@ from axialnav.estimators.window import FrameWindow
 
 Array = NDArray[np.float64]
 ENOUGH_BANDS = 3
+ENOUGH_FRAMES = 3  # for peaks of bands to be sharp enough to lie on a line
 MAX_OUTSIDE_MASS = 0.01
 MIN_SIGNIFICANCE = 6.0
 MAX_RIVAL_SHARE = 0.75
@@ -119,7 +120,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         return refused(MotionReason.PRIOR_OUTSIDE, signed=True, window_s=span_s, method="joint")
     found = window.coarse.profiles(window.order, grid)
     choice, roll_px = choose(found, options.consensus), 0.0
-    if options.consensus:
+    if options.consensus and frames >= ENOUGH_FRAMES:
         found, choice, roll_px = _levelled(found, choice, window.layout.band_height)
     votes = (int(choice.agree.sum()), BANDS)
     reason = doubt_search(found, choice, options)

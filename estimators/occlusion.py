@@ -27,7 +27,7 @@ FLANK_PX = 12
 SURE, PERHAPS = 5.0, 2.0
 OUTSTANDING = 3.0  # times the power of the usual cell: more than walls are uneven
 STILL_SHARE = 0.8  # of the power of frames that are all alike there, and of the shifted sum
-ENOUGH_FRAMES = 3  # two look alike too easily
+ENOUGH_FRAMES = 3  # for detail, and for objects to grow: two look alike too easily
 LARGEST_SHARE = 0.3  # of the picture that objects may seem to hide: beyond, only those cells that surely do
 LEAST_TRAVEL_PX = 1
 LEAST_SHARE = 0.3
@@ -161,16 +161,17 @@ class OccluderFinder:
             return np.zeros(still.shape[1:], dtype=np.bool_)
         self._powers(planes, order[:1], 0 * order[:1], self._all, one)
         self._powers(planes, order, 0 * order, self._all, still)
-        usual = _middle(one[1] / self._samples) * self._samples
+        part = 1 if len(order) >= ENOUGH_FRAMES else 0
+        usual = _middle(one[part] / self._samples) * self._samples
         noise = usual * np.sqrt(2.0 / self._samples)
-        repeats: Mask = np.asarray(still[1] - usual > SURE * noise)
+        repeats: Mask = np.asarray(still[part] - usual > SURE * noise)
         doubtful: Mask = np.any(repeats, axis=1)
         if not doubtful.any():
             return repeats
         shift = offset - (offset.min() + offset.max()) // 2
         moving[:] = 0.0
         self._powers(planes, order, shift, doubtful, moving)
-        surely: Mask = np.asarray(repeats & (still[1] - moving[1] > SURE * noise))
+        surely: Mask = np.asarray(repeats & (still[part] - moving[part] > SURE * noise))
         if len(order) < ENOUGH_FRAMES or not surely.any():
             return surely
         self._powers(planes, order, shift, ~doubtful, moving)

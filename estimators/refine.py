@@ -20,6 +20,7 @@ from axialnav.estimators.window import FrameWindow
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 MAX_ROLL_STEPS = 4
+ENOUGH_FRAMES = 3  # to believe that what was cut out is an object
 CLEARLY = 1.5  # ratio of two variances that ten strips hardly show by chance
 JUMP_BINS = 2.0  # a drift that changes by more from window to window is asked again
 SLOW_PX = 2.0  # per frame: below, what repeats is weighed anew without the pattern
@@ -41,7 +42,7 @@ def follow(
     def cut(drift_px: float) -> Products:
         """Products of windows that follow a drift [px per frame]."""
         products = window.following(start_px, drift_px, reach)
-        return products.selected(strips | window.cleared)
+        return products.selected(strips | window.cleared if len(window.order) >= ENOUGH_FRAMES else strips)
 
     hidden_px, steps = hidden_drift_px(window.bin_height, len(window.order)), len(window.order) - 1
     harmless_px = hidden_px * steps / (steps + steps % 2)  # of two frames one keeps its place, the other moves twice
