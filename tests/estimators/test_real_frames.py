@@ -96,18 +96,18 @@ def test_exposures_of_a_hand_held_camera_agree_with_two_registrations(shared: Pa
     """
     floor = read_floor(shared / "frames_240fps")
     seen = measure_pairs(floor, 3)
-    assert len(seen.value) >= 12
+    assert len(seen.value) >= 18
     for registered in (seen.shifts, seen.tracked):
         off = np.abs(seen.value - registered)
-        assert np.median(off) < 0.2
-        assert off.max() < 0.5
+        assert np.median(off) < 0.12
+        assert off.max() < 0.35
 
 
 def test_exposures_that_last_all_the_time_are_refused_where_the_camera_changes_its_speed(shared: Path) -> None:
     """Averages of 8: nowhere here is the motion even over two of them, it changes by a pixel and more a fast frame."""
     seen = measure_pairs(read_floor(shared / "frames_240fps"), 8)
-    assert len(seen.value) < 0.25 * seen.pairs
-    assert seen.gross <= 1
+    assert len(seen.value) < 0.3 * seen.pairs
+    assert seen.gross == 0
     assert np.abs(seen.value - seen.shifts).max() < 1.5
 
 
