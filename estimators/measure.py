@@ -146,10 +146,7 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
     reason = doubt_pair(kappa, skew) if frames == 2 else ""
     if reason:
         return refused(reason, signed=True, window_s=span_s, method="joint", kappa=kappa.value, bands=votes)
-    if window.stretch.stale():
-        re, im, offset = window.halves(products.band)
-        apart = stretch_variance(re, im, products.band, offset.astype(np.float64), fit)
-        window.stretch.renew(apart, max(frames - 1, STRETCH_WINDOWS))
+    _compare_halves(window, products, fit)
     cross_px, cross_sigma_px = cross_or_nan(drift)
     return MotionEstimate(
         float(fit.motion[0]),
@@ -165,6 +162,14 @@ def measure_joint(window: FrameWindow, options: JointOptions) -> MotionEstimate:
         cross_sigma_px=cross_sigma_px,
         coherence_px=coherence_px(fit, products),
     )
+
+
+def _compare_halves(window: FrameWindow, products: Products, fit: Fit) -> None:
+    """Ask the halves of the picture how far their displacements are apart, now and then."""
+    if window.stretch.stale():
+        re, im, offset = window.halves(products.band)
+        apart = stretch_variance(re, im, products.band, offset.astype(np.float64), fit)
+        window.stretch.renew(apart, max(products.frames - 1, STRETCH_WINDOWS))
 
 
 def doubt_pair(kappa: Kappa, skew_px2: float) -> str:
