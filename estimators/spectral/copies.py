@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from axialnav.estimators.frames import Image
 from axialnav.estimators.rows import bin_height, fast_length, row_sums
 from axialnav.estimators.spectral.blocks import EVERY, block_notches, blocky
-from axialnav.estimators.spectral.picture import FIRST_BIN, LAST_FREQUENCY, STRIPS, row_window
+from axialnav.estimators.spectral.picture import FIRST_BIN, LAST_FREQUENCY, STRIPS, level_and_window, row_window
 from axialnav.models.jit import kernel
 
 Array = NDArray[np.float64]
@@ -83,26 +83,6 @@ def sum_into_bins(frame: Image, bins: int, sums: NDArray[np.uint32]) -> None:
             line = frame[r * bins + k]
             for c in range(columns):
                 out[c] += line[c]
-
-
-@kernel
-def level_and_window(sums: NDArray[np.uint32], window: Plane, out: Plane) -> None:
-    """Take the mean of every column off and multiply by the window, ``out`` (r, l).
-
-    A mean, not a median: what is not linear would fill the dark lines of the comb.
-    """
-    rows, columns = sums.shape
-    level = np.zeros(columns, dtype=np.float32)
-    for r in range(rows):
-        line = sums[r]
-        for c in range(columns):
-            level[c] += np.float32(line[c])
-    for c in range(columns):
-        level[c] /= np.float32(rows)
-    for r in range(rows):
-        line, target = sums[r], out[r]
-        for c in range(columns):
-            target[c] = (np.float32(line[c]) - level[c]) * window[c]
 
 
 @kernel

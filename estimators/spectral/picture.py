@@ -68,21 +68,22 @@ def add_rows(frame: NDArray[np.uint8], height: int, sums: NDArray[np.uint32]) ->
 
 @kernel
 def level_and_window(sums: NDArray[np.uint32], window: Plane, out: Plane) -> None:
-    """Take the mean of every column off and multiply by the window, ``out`` (r, w).
+    """Take the mean of every column off and multiply by the window, ``out`` (r, l).
 
     A mean, not a median: what is not linear would fill the dark lines of the comb.
     """
     rows, columns = sums.shape
-    level = np.zeros(columns, dtype=np.float64)
+    level = np.zeros(columns, dtype=np.float32)
     for r in range(rows):
         line = sums[r]
         for c in range(columns):
-            level[c] += line[c]
-    level /= rows
+            level[c] += np.float32(line[c])
+    for c in range(columns):
+        level[c] /= np.float32(rows)
     for r in range(rows):
-        line = sums[r]
+        line, target = sums[r], out[r]
         for c in range(columns):
-            out[r, c] = np.float32(line[c] - level[c]) * window[c]
+            target[c] = (np.float32(line[c]) - level[c]) * window[c]
 
 
 @kernel
